@@ -1,0 +1,146 @@
+# gonio: builds everything into build/<variant>/ and links build/<program> to the release variant.
+#
+#   make                 the three programs            make demo     a whole campaign on the simulated bench
+#   make check           unit and system tests         make layers   who may include whom
+#   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
+#
+# A variant is a compiler and its flags: release, clang, asan, debug. VARIANT=asan make check.
+
+VARIANT ?= release
+B       := build/$(VARIANT)
+PREFIX  ?= /usr/local
+DESTDIR ?=
+VERSION := 0.1.0
+
+CC_release := $(if $(filter default,$(origin CC)),gcc,$(CC))
+CC_debug   := $(CC_release)
+CC_clang   := clang
+CC_asan    := gcc
+OPT_release := -O2 -g
+OPT_clang   := -O2 -g
+OPT_debug   := -Og -g3
+OPT_asan    := -O1 -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+override CC := $(CC_$(VARIANT))
+$(if $(CC),,$(error unknown VARIANT '$(VARIANT)': release, clang, asan or debug))
+
+WARN := -Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wpointer-arith -Wformat=2 -Wvla \
+        -Wdouble-promotion $(if $(CI)$(WERROR),-Werror)
+CPPFLAGS += -I. -D_GNU_SOURCE -DGONIO_VERSION='"$(VERSION)"'
+CFLAGS   := -std=c17 $(WARN) $(OPT_$(VARIANT)) -ffp-contract=off -fno-math-errno -pthread $(EXTRA_CFLAGS)
+LDFLAGS  += $(filter -fsanitize% -fno-sanitize%,$(CFLAGS)) -pthread
+
+# The layers, and for each program the layers it is made of, users before what they use.
+LAYERS        := base model fit drivers campaign sim daemon cli
+USES_goniod   := daemon campaign drivers fit model base
+USES_gonio    := cli campaign drivers fit model base
+USES_goniosim := sim model base
+LIBS_base     := -lconfig
+LIBS_drivers  := -lmodbus -lserialport
+LIBS_campaign := -lsqlite3 -ljansson
+LIBS_sim      := -ljansson
+LIBS_daemon   := -lmicrohttpd -ljansson
+LIBS_cli      := -lcurl -ljansson
+PROGRAMS      := goniod gonio goniosim
+MAIN_goniod   := daemon
+MAIN_gonio    := cli
+MAIN_goniosim := sim
+
+Q := $(if $(V),,@)
+say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
+
+.DEFAULT_GOAL := all
+.PHONY: all check unit system demo deps deps-check layers install uninstall clean doc lint
+all: $(PROGRAMS:%=$(B)/%) $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
+
+# --- objects, one archive a layer, programs -------------------------------------------------------
+objects = $(patsubst %.c,$(B)/obj/%.o,$(filter-out $(1)/main.c,$(wildcard $(1)/*.c)))
+OBJECTS :=
+define layer_rules
+OBJECTS += $(call objects,$(1))
+$(B)/lib$(1).a: $(call objects,$(1))
+	$$(call say,AR,$$@)
+	$(Q)rm -f $$@ && $(AR) rcs $$@ $$^
+endef
+$(foreach l,$(LAYERS),$(eval $(call layer_rules,$(l))))
+
+libs_of = $(sort $(foreach l,$(1),$(LIBS_$(l)))) -lm
+define program_rules
+OBJECTS += $(B)/obj/$(MAIN_$(1))/main.o
+$(B)/$(1): $(B)/obj/$(MAIN_$(1))/main.o $(USES_$(1):%=$(B)/lib%.a)
+	$$(call say,LINK,$$@)
+	$(Q)$(CC) $(LDFLAGS) -o $$@ $$^ $(call libs_of,$(USES_$(1)))
+build/$(1): $(B)/$(1)
+	$(Q)ln -sfn $(VARIANT)/$(1) $$@
+endef
+$(foreach p,$(PROGRAMS),$(eval $(call program_rules,$(p))))
+
+$(B)/obj/%.o: %.c Makefile
+	$(call say,CC,$<)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c -o $@ $<
+
+# Numeric kernels are worth the vectoriser; flags are per file because optimize() attributes disable it.
+$(B)/obj/model/%.o $(B)/obj/fit/%.o: CFLAGS += $(if $(filter asan debug,$(VARIANT)),,-O3)
+
+# --- tests ----------------------------------------------------------------------------------------
+# tests/unit/test_<module>.c is one program. The layers it needs are named in its first lines: '// uses: fit model'.
+UNIT_TESTS := $(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c))
+uses = $(shell sed -n 's,^// uses: *,,p' tests/unit/$(1).c)
+define test_rules
+OBJECTS += $(B)/obj/tests/unit/$(1).o
+$(B)/tests/$(1): $(B)/obj/tests/unit/$(1).o $(patsubst %,$(B)/lib%.a,$(call uses,$(1)))
+	$$(call say,LINK,$$@)
+	$(Q)mkdir -p $$(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $$@ $$^ -lcmocka $(call libs_of,$(call uses,$(1)))
+endef
+$(foreach t,$(UNIT_TESTS),$(eval $(call test_rules,$(t))))
+
+SHIM := $(B)/tests/libptycompat.so
+$(SHIM): tests/shim/ptycompat.c
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(CPPFLAGS) -std=c17 $(WARN) -O1 -g -fPIC -shared -o $@ $< -ldl
+
+unit: $(UNIT_TESTS:%=$(B)/tests/%)
+	$(Q)scripts/unit $(B)/tests $(UNIT_TESTS)
+
+system: all $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
+	$(Q)GONIO_BUILD=$(abspath $(B)) scripts/system $(ARGS)
+
+check: deps-check
+	$(Q)$(MAKE) --no-print-directory all unit layers
+	$(Q)$(MAKE) --no-print-directory system
+
+layers:
+	$(Q)scripts/layers
+
+# --- first contact --------------------------------------------------------------------------------
+deps:
+	$(Q)scripts/deps build
+deps-check:
+	$(Q)scripts/deps build check
+demo: deps
+	$(Q)$(MAKE) --no-print-directory -j$$(nproc) all
+	$(Q)scripts/demo
+
+# --- installation ---------------------------------------------------------------------------------
+MAN := $(patsubst doc/%.scd,$(B)/man/%,$(wildcard doc/*.scd))
+doc: $(MAN)
+$(B)/man/%: doc/%.scd
+	$(call say,MAN,$@)
+	$(Q)mkdir -p $(@D) && scdoc <$< >$@
+install: all doc
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/sbin $(DESTDIR)$(PREFIX)/share/gonio/configs
+	install -m755 $(B)/gonio $(B)/goniosim $(DESTDIR)$(PREFIX)/bin
+	install -m755 $(B)/goniod $(DESTDIR)$(PREFIX)/sbin
+	install -m644 $(wildcard configs/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/configs
+	for page in $(notdir $(MAN)); do \
+	    install -D -m644 $(B)/man/$$page $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page || exit 1; done
+uninstall:
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(DESTDIR)$(PREFIX)/sbin/goniod
+	rm -rf $(DESTDIR)$(PREFIX)/share/gonio
+	for page in $(notdir $(MAN)); do rm -f $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page; done
+clean:
+	rm -rf build
+
+-include $(OBJECTS:.o=.d)

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// The inversion: from readings f(theta_i, theta_r, dphi) to (n, k, sigma, ks, kd), with uncertainties and
+// with what the data cannot tell. This header is all that other layers need of fit/.
+//
+// Units: radians and sr^-1. No I/O, no log, no threads of its own unless options say so. Arrays in
+// fit_data are borrowed for the duration of the call. Same data, options and seed give the same result,
+// to the bit. Thread: any; calls share nothing.
+#pragma once
+#include "model/brdf.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum fit_param { FIT_N, FIT_K, FIT_SIGMA, FIT_KS, FIT_KD, FIT_PARAMS };
+
+enum fit_method {
+    FIT_MEMETIC, // variable projection for ks and kd, search in (n, sqrt k, log sigma), LM polish in k^2
+    FIT_PAPER    // the paper's binary genetic algorithm, for comparison
+};
+
+enum fit_weighting {
+    FIT_UNIFORM,  // g = 1
+    FIT_DENSE,    // g = dense_g where |theta_r - theta_i| <= dense_half_width, edges included; else 1
+    FIT_RELATIVE, // g = 1/f^2
+    FIT_VARIANCE  // g = 1/u^2
+};
+
+struct fit_data {
+    size_t count;
+    const double *theta_i_rad; // [0, pi/2)
+    const double *theta_r_rad; // [0, pi/2), unsigned
+    const double *dphi_rad;    // phi_r - phi_i; pi = specular half plane
+    const double *f_per_sr;
+    const double *u_per_sr; // type A, uncorrelated, standard uncertainty, > 0; NULL when unknown
+};
+
+// The paper leaves these open; the defaults are ours (fit_options_default).
+struct fit_paper_options {
+    int population;  // 100; even, 4..10000
+    int bits;        // per gene, 20; 4..30
+    int generations; // 1000
+    double pc;       // crossover probability 0.5
+    double pm;       // mutation probability 0.05, per bit
+    bool elitism;    // false: the paper names none
+    int scaling;     // 0: fitness 1/Delta; 1: linear scaling, best = 2 x mean
+};
+
+struct fit_options {
+    enum fit_method method;
+    enum fit_weighting weighting;
+    double dense_g;
+    double dense_half_width_rad;
+    enum brdf_diffuse diffuse;
+    struct brdf_params lower, upper; // bounds, inclusive
+    uint64_t seed;
+    int threads;         // 1..64
+    double u_scale;      // relative standard uncertainty of a scale factor common to all readings (type B)
+    struct fit_paper_options paper;
+    bool (*canceled)(void *ctx); // NULL: never; asked at least every 10 ms
+    void *cancel_ctx;
+    void (*trace)(void *ctx, int generation, double best_delta, double mean_delta); // NULL: none
+    void *trace_ctx;
+};
+
+struct fit_estimate {
+    double value;
+    double u;          // standard uncertainty: sandwich covariance, and u_scale where it applies
+    double lo95, hi95; // profile likelihood, all five parameters free; widened by u_scale where it applies
+    bool identified;   // not on a bound, and [lo95, hi95] within +-25 % of the value
+    bool at_bound;
+};
+
+struct fit_derived {
+    double value, u;
+};
+
+enum fit_warning {
+    FIT_WARN_DHR_ABOVE_ONE = 1 << 0, // the fitted surface reflects more than it receives
+    FIT_WARN_N_BELOW_ONE = 1 << 1,   // unphysical for a paint or a dielectric
+    FIT_WARN_AT_BOUND = 1 << 2,
+    FIT_WARN_FEW_SWEEPS = 1 << 3,     // fewer than 3 different theta_i
+    FIT_WARN_NOT_IDENTIFIED = 1 << 4, // f_00 alone does not separate n, k and ks
+    FIT_WARN_MODEL_ERROR = 1 << 5     // residuals are larger or smoother than noise: intervals miss model error
+};
+
+struct fit_result {
+    struct brdf_params params;
+    double delta; // eq. 17 with the weights given, at params
+    struct fit_estimate estimate[FIT_PARAMS];
+    struct fit_derived ks_r0, ks_r45;        // ks times mean Fresnel reflectance at beta = 0 and 45 deg
+    struct fit_derived dhr_0, dhr_45, dhr_60; // directional-hemispherical reflectance of the fit
+    double correlation[FIT_PARAMS][FIT_PARAMS];
+    double chi2_per_dof;    // NAN without u_per_sr
+    double residual_lag1;   // autocorrelation of neighbouring residuals within a sweep
+    unsigned warnings;      // of fit_warning
+    long evaluations;       // of the whole data set
+    double elapsed_ms;       // search and polish
+    double elapsed_total_ms; // with uncertainties
+};
+
+// Negative: nothing was fitted. fit_stop_text says it in words.
+enum fit_stop {
+    FIT_OK = 0,
+    FIT_E_FEW_POINTS = -1, // fewer points than parameters
+    FIT_E_ALL_ZERO = -2,   // eq. 17 has no denominator
+    FIT_E_DATA = -3,       // a NAN or infinite value, theta outside [0, pi/2), u <= 0
+    FIT_E_OPTIONS = -4,    // empty or negative bounds, variance weighting without u, ...
+    FIT_E_CANCELED = -5,
+    FIT_E_MEMORY = -6
+};
+
+struct fit_options fit_options_default(void); // memetic, uniform, paper's diffuse, bounds of the manual, seed 1
+int fit_run(const struct fit_data *data, const struct fit_options *options, struct fit_result *ret_result);
+const char *fit_stop_text(int stop);
+const char *fit_param_name(enum fit_param p); // "n", "k", "sigma", "ks", "kd"
+
+// One sentence a person can act on, for one bit of result->warnings; the numbers are in it.
+// Returns the length that snprintf would.
+int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text, size_t size);
+
+// Eq. 17 at given parameters: sum g (model - f)^2 / sum g f^2. Negative fit_stop on bad data.
+int fit_delta(const struct fit_data *data, const struct fit_options *options, const struct brdf_params *p,
+              double *ret_delta);
