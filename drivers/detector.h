@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// One detector chain: signal and, where wired, the reference monitor, read in one transaction. A value
+// never travels without its flags; a reading that is not a number is an error, never a number. The
+// driver does I/O; averaging, ranging and settling rules live above (daemon/acquire.h). Thread: instrument.
+#pragma once
+#include "base/cancel.h"
+#include "base/clk.h"
+#include "base/err.h"
+
+#include <stdbool.h>
+
+struct detector;
+
+enum detector_flag {
+    DETECTOR_SATURATED = 1 << 0,   // input, filter or output overload, or >= 0.95 of full scale
+    DETECTOR_UNLOCKED = 1 << 1,    // reference lost
+    DETECTOR_UNSETTLED = 1 << 2    // something changed the filter: the settling time no longer holds
+};
+
+struct detector_sample {
+    double signal_v;  // signed; the in-phase component of a lock-in
+    double monitor_v; // NAN when there is no monitor
+    double reference_hz; // NAN when there is none
+};
+
+struct detector_setup {
+    double time_constant_s;
+    int slope_db;    // 6, 12, 18, 24 per octave
+    int monitor_aux; // 1..4; 0: no monitor
+};
+
+struct detector_ops {
+    int (*identify)(struct detector *d, char *ret_text, size_t size, struct gon_error *err);
+    // Writes the setting, reads it back; ret_time_constant_s is what the device really has.
+    int (*setup)(struct detector *d, const struct detector_setup *s, double *ret_time_constant_s,
+                 struct gon_error *err);
+    int (*ranges)(struct detector *d); // how many; range 0 is the most sensitive
+    double (*full_scale_v)(struct detector *d, int range);
+    int (*set_range)(struct detector *d, int range, struct gon_error *err); // read back
+    int (*sample)(struct detector *d, struct detector_sample *ret_sample, struct gon_error *err);
+    // What happened since the last call, which clears it. Flags of detector_flag.
+    int (*condition)(struct detector *d, unsigned *ret_flags, struct gon_error *err);
+    int (*reopen)(struct detector *d, struct gon_error *err);
+    void (*free)(struct detector *d);
+};
+
+struct detector {
+    const struct detector_ops *ops; // first member of each driver's own struct
+};
+
+int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *cancel,
+                        struct detector **ret_detector, struct gon_error *err);

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// One laser. Only daemon/safety calls emission; everything else only reads. Thread: instrument (later
+// the guard process owns the port).
+//
+// off: sent with a leading terminator so that a half-sent command cannot swallow it, repeated after the
+// laser's minimum gap until the read-back says off; safe to call at any time, any number of times.
+// on: sent once, never repeated by a driver; accepted is not light: poll status.
+#pragma once
+#include "base/cancel.h"
+#include "base/clk.h"
+#include "base/err.h"
+
+#include <stdbool.h>
+
+struct laser;
+
+enum laser_state {
+    LASER_OFF,
+    LASER_WARMING,       // on its way: temperatures, delay by regulation
+    LASER_EMITTING,      // at its set-point
+    LASER_INTERLOCK,     // open
+    LASER_NEEDS_KEY,     // an operator must cycle the key
+    LASER_FAULT
+};
+
+struct laser_status {
+    enum laser_state state;
+    bool emission;       // the laser says that light comes out, or may at any moment
+    bool interlock_closed;
+    double power_w;      // as the laser measures it; NAN when it does not
+    double setpoint_w;
+    int fault_code;      // 0: none
+};
+
+struct laser_ops {
+    int (*identify)(struct laser *l, char *ret_text, size_t size, struct gon_error *err);
+    int (*status)(struct laser *l, struct laser_status *ret_status, struct gon_error *err);
+    int (*set_power)(struct laser *l, double power_w, struct gon_error *err); // read back
+    int (*on)(struct laser *l, struct gon_error *err);
+    int (*off)(struct laser *l, struct gon_error *err); // 0 only when read back
+    int (*reopen)(struct laser *l, struct gon_error *err);
+    const char *(*fault_text)(int code);
+    void (*free)(struct laser *l);
+};
+
+struct laser {
+    const struct laser_ops *ops; // first member of each driver's own struct
+};
+
+// Opens the link. Cobolt 05 series: 100 ms between commands.
+int laser_cobolt_open(const char *link, struct clk *clk, const struct cancel *cancel,
+                      struct laser **ret_laser, struct gon_error *err);
+
+const char *laser_state_name(enum laser_state s); // "off", "warming", "emitting", ...

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// A byte stream to one instrument: a serial port or a raw TCP connection behind the same six calls.
+//
+//   serial:/dev/serial/by-id/usb-...?baud=115200&parity=N&stop=1    libserialport; termios where it refuses (ptys)
+//   tcp:host:port                                                  as ser2net and serial servers give
+//
+// Nothing here blocks longer than its deadline: waiting is poll() on the descriptor and on the cancel
+// token, I/O is non-blocking. A hang-up is GON_E_GONE at once, never a timeout. Ports are locked
+// (flock and TIOCEXCL); the second opener hears who has it. Thread: the one that opened it.
+#pragma once
+#include "base/cancel.h"
+#include "base/clk.h"
+#include "base/err.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct transport;
+
+// What a link has seen since it was opened first; kept across reopening.
+struct transport_stats {
+    uint64_t bytes_out, bytes_in, queries, timeouts, garbled, reopened;
+    int64_t last_latency_ns, worst_latency_ns;
+};
+
+// GON_E_INPUT: the link's text is wrong. GON_E_GONE: no such port or host. GON_E_REFUSED: in use.
+int transport_open(const char *link, struct clk *clk, const struct cancel *cancel,
+                   struct transport **ret_transport, struct gon_error *err);
+void transport_close(struct transport *t); // also flushes nothing: whoever needs OFF sent sends it before
+
+// Closes and opens again by the same name (after GON_E_GONE). One try; the caller paces retries.
+int transport_reopen(struct transport *t, struct gon_error *err);
+
+// All of it within the deadline, or an error.
+int transport_write(struct transport *t, const void *data, size_t size, int64_t deadline_ns,
+                    struct gon_error *err);
+// At least one byte, at most size: the count. GON_E_LINK at the deadline.
+int transport_read(struct transport *t, void *data, size_t size, int64_t deadline_ns,
+                   struct gon_error *err);
+// Throws away what has arrived, until the line was silent for quiet_ns. Returns the bytes dropped.
+int transport_drain(struct transport *t, int64_t quiet_ns, struct gon_error *err);
+
+const char *transport_link(const struct transport *t);
+const struct transport_stats *transport_stats(const struct transport *t);
