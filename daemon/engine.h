@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// The campaign as straight-line code: opens nothing, owns nothing but its own progress. It runs on the
+// instrument thread, or on a test's only thread in virtual time: time, storage, publishing and fitting
+// come through engine_ports, the bench through struct instrument.
+//
+//   dark (laser off) -> laser on, warm-up -> beam -> sweeps (a fit is asked for after each) -> beam ->
+//   laser off -> dark -> last fit
+//
+// The laser is on from warm-up to the last beam reading and off on every way out. A device that is gone
+// or does not answer pauses the run in a safe state (emission off where the laser can be reached, axes
+// stopped) and it goes on by itself once the device is back and identified, from the point in progress;
+// an interlock, a device's fault or a refused command pauses until somebody resumes. Each reading is
+// acknowledged by the store before the next point begins.
+#pragma once
+#include "base/cancel.h"
+#include "base/clk.h"
+#include "base/err.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct campaign_config;
+struct instrument;
+struct plan;
+struct store_reading;
+
+enum run_state {
+    RUN_QUEUED,
+    RUN_PREPARING, // identify, home, dark, warm-up, beam
+    RUN_RUNNING,
+    RUN_PAUSED,
+    RUN_STOPPING,
+    RUN_STOPPED, // by somebody, or by the daemon's end; can be resumed
+    RUN_DONE,
+    RUN_FAILED
+};
+
+const char *run_state_name(enum run_state s); // "queued", "preparing", ...
+
+// What happened, for whoever watches. Text is borrowed for the call.
+enum engine_event_kind { ENGINE_STATE, ENGINE_READING, ENGINE_SWEEP, ENGINE_LOG };
+
+struct engine_event {
+    enum engine_event_kind kind;
+    enum run_state state;
+    int sweep, sweeps;          // 1..sweeps; 0 while preparing
+    int point, points;          // within the whole plan: done and all
+    double theta_i_deg;
+    double theta_r_deg;
+    double f_per_sr;            // provisional value of this reading (opening beam and dark); NAN before there is one
+    double u_per_sr;            // type A
+    unsigned flags;             // of the stored reading
+    double left_s;              // estimate; NAN unknown
+    bool emission;
+    const char *text;           // ENGINE_LOG and pauses: one sentence that names the device
+};
+
+struct engine_ports {
+    void *ctx;
+    struct clk *clk;
+    const struct cancel *cancel; // stop: laser off, axes stopped, RUN_STOPPED
+    // Returns once the row is committed: 0, or GON_E_STORE, GON_E_CANCELED.
+    int (*store_reading)(void *ctx, const struct store_reading *reading, struct gon_error *err);
+    int (*store_event)(void *ctx, const char *level, const char *source, const char *text,
+                       struct gon_error *err);
+    void (*publish)(void *ctx, const struct engine_event *event);
+    void (*request_fit)(void *ctx, int sweep, bool last); // does not wait
+    bool (*take_resume)(void *ctx); // true once after an operator's "resume"; asked while paused
+};
+
+// Runs the plan from its first point without an accepted reading (the plan carries what is done).
+// Returns the state it ended in: RUN_DONE, RUN_STOPPED or RUN_FAILED; err says why it failed.
+enum run_state engine_run(const struct engine_ports *ports, struct instrument *instrument,
+                          const struct campaign_config *config, const struct plan *plan,
+                          struct gon_error *err);
