@@ -107,8 +107,11 @@ unit: $(UNIT_TESTS:%=$(B)/tests/%)
 system: all $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
 	$(Q)GONIO_BUILD=$(abspath $(B)) scripts/system $(ARGS)
 
+# Parallel on its own unless the caller chose a number of jobs.
+PARALLEL = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc))
 check: deps-check
-	$(Q)$(MAKE) --no-print-directory all unit layers
+	$(Q)$(MAKE) --no-print-directory $(PARALLEL) all layers $(UNIT_TESTS:%=$(B)/tests/%)
+	$(Q)$(MAKE) --no-print-directory unit
 	$(Q)$(MAKE) --no-print-directory system
 
 layers:
@@ -120,7 +123,7 @@ deps:
 deps-check:
 	$(Q)scripts/deps build check
 demo: deps
-	$(Q)$(MAKE) --no-print-directory -j$$(nproc) all
+	$(Q)$(MAKE) --no-print-directory $(PARALLEL) all
 	$(Q)scripts/demo
 
 # --- installation ---------------------------------------------------------------------------------
