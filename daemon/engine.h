@@ -55,17 +55,29 @@ struct engine_event {
     const char *text;           // ENGINE_LOG and pauses: one sentence that names the device
 };
 
+// Means of the opening reference readings, for provisional f_r after a resume; NAN: not measured yet.
+struct engine_opening {
+    double dark_signal_v, dark_monitor_v;
+    double beam_signal_v, beam_monitor_v;
+};
+
+// While a port waits it calls instrument_breathe at least every 100 ms: the laser's lease.
 struct engine_ports {
     void *ctx;
     struct clk *clk;
     const struct cancel *cancel; // stop: laser off, axes stopped, RUN_STOPPED
-    // Returns once the row is committed: 0, or GON_E_STORE, GON_E_CANCELED.
+    const struct engine_opening *opening; // NULL: a new campaign
+    // Returns once the row is committed: 0, or GON_E_STORE (also when there was no acknowledgement for
+    // 10 s), GON_E_CANCELED. After GON_E_STORE emission goes off and the same row is offered again until
+    // it is accepted, so that a row which did arrive must be accepted again when it is the same.
     int (*store_reading)(void *ctx, const struct store_reading *reading, struct gon_error *err);
     int (*store_event)(void *ctx, const char *level, const char *source, const char *text,
                        struct gon_error *err);
     void (*publish)(void *ctx, const struct engine_event *event);
     void (*request_fit)(void *ctx, int sweep, bool last); // does not wait
     bool (*take_resume)(void *ctx); // true once after an operator's "resume"; asked while paused
+    bool (*take_pause)(void *ctx);  // true once after an operator's "pause"; asked between readings and
+                                    // while warming up. NULL: nobody pauses
 };
 
 // Runs the plan from its first point without an accepted reading (the plan carries what is done).

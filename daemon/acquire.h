@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// One attempt at one reading: wait until the filter has settled, take samples that are nearly
+// independent, say what was wrong with them. Thread: instrument.
+//
+// Settling: the residual of a step through n RC poles (detector_settle_s) of ACQUIRE_RESIDUAL of the
+// signal before; coming down from a larger signal, of that much less, so that what is left of the old
+// signal stays ACQUIRE_RESIDUAL of the new full scale. It counts from the arrival and from the range.
+// Spacing: white noise through n equal poles is correlated over x = t / time constant by
+//   1: e^-x   2: (1 + x) e^-x   3: (1 + x + x^2/3) e^-x   4: (1 + x + 2x^2/5 + x^3/15) e^-x,
+// and the samples are spaced to a correlation of 0.05, where the sd of the mean of four taken as
+// independent is low by 5 %.
+#pragma once
+#include "base/cancel.h"
+#include "base/err.h"
+#include "daemon/instrument.h"
+
+#define ACQUIRE_RESIDUAL 1e-4
+#define ACQUIRE_UNDER 0.2 // of the next smaller range's full scale: below it the range goes down
+
+struct acquire {
+    int range;            // to begin with; -1: the least sensitive. Follows the readings
+    double last_signal_v; // of the reading before, for the settling; 0: none
+};
+
+struct acquire_wish {
+    int count;               // samples, 1..1000
+    int64_t since_ns;        // when the light last changed: arrival, laser on or off
+    double monitor_least_v;  // below it the light was lost; NAN: not checked
+};
+
+struct acquire_reading {
+    int64_t utc_ns;       // of the first sample
+    int count, range;
+    double signal_v, signal_sd_v;   // mean, sample sd (0 for one sample)
+    double monitor_v, monitor_sd_v; // NAN: no monitor
+    unsigned flags;                 // of store.h
+    bool accepted;
+    bool again;           // not accepted, and another attempt may mend it (the range was changed in acquire)
+};
+
+// GON_E_LINK and GON_E_GONE: the detector went away and nothing was measured.
+int acquire_attempt(struct instrument *in, struct acquire *a, const struct acquire_wish *wish,
+                    const struct cancel *cancel, struct acquire_reading *ret_reading,
+                    struct gon_error *err);
+double acquire_settle_s(double time_constant_s, int slope_db, double residual);
+double acquire_spacing_s(double time_constant_s, int slope_db);
