@@ -15,6 +15,7 @@
 #include "drivers/laser.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct safety;
