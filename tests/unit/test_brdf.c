@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+// uses: model
+#include "model/brdf.h"
+#include "tests/unit/golden.h"
+
+#include <complex.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+#define PI 3.14159265358979323846
+
+static struct golden open_or_fail(const char *name)
+{
+    struct golden t;
+    char path[128];
+    snprintf(path, sizeof path, "tests/golden/%s", name);
+    if (!golden_open(&t, path) || t.rows == 0)
+        fail_msg("%s is missing or empty: run the tests from the root of the repository", path);
+    return t;
+}
+
+static struct brdf_params params_at(const struct golden *t, int i)
+{
+    return (struct brdf_params){golden_at(t, i, "n"), golden_at(t, i, "k"),
+                                golden_at(t, i, "sigma"), golden_at(t, i, "ks"),
+                                golden_at(t, i, "kd")};
+}
+
+static double f00_at_deg(const struct brdf_params *p, double ti, double tr, double dphi)
+{
+    struct brdf_geometry g = brdf_geometry(golden_rad(ti), golden_rad(tr), golden_rad(dphi));
+    return brdf_f00(p, BRDF_DIFFUSE_PAPER, &g);
+}
+
+// 1e-10 of f_00 without its diffuse part, which is what the reference program gives.
+static void check_rows(const char *name, bool in_plane)
+{
+    struct golden t = open_or_fail(name);
+    for (int i = 0; i < t.rows; i++) {
+        struct brdf_params p = params_at(&t, i);
+        double ti = golden_at(&t, i, "theta_i_deg");
+        double tr = golden_at(&t, i, in_plane ? "theta_r_signed_deg" : "theta_r_deg");
+        double dphi = in_plane ? (tr >= 0 ? 180 : 0) : golden_at(&t, i, "dphi_deg");
+        double want = golden_at(&t, i, "f00");
+        double got = f00_at_deg(&p, ti, fabs(tr), dphi);
+        double specular = want - p.kd / cos(golden_rad(ti));
+        // The table's own rounding (17 digits of the sum) is all that is added to the tolerance.
+        double tolerance = 1e-10 * fabs(specular) + 4e-16 * want;
+        if (!(fabs(got - want) <= tolerance))
+            fail_msg("%s row %d (theta_i %g, theta_r %g, dphi %g): f00 %.17g, reference %.17g", name,
+                     i, ti, tr, dphi, got, want);
+    }
+    golden_close(&t);
+}
+
+static void f00_in_plane_equals_the_reference(void **state)
+{
+    (void)state;
+    check_rows("golden_inplane.csv", true);
+}
+
+static void f00_out_of_plane_equals_the_reference(void **state)
+{
+    (void)state;
+    check_rows("golden_mueller.csv", false);
+}
+
+static void f00_at_the_edges_equals_the_reference(void **state)
+{
+    (void)state;
+    check_rows("golden_edge.csv", false);
+}
+
+static void f00_shares_no_common_misreading_of_the_paper(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *column, *name;
+    } traps[] = {
+        {"f00_eps_is_n_plus_ik", "eps = n + ik instead of (n + ik)^2 (erratum 1)"},
+        {"f00_eq5_exponent_no_2", "exp(-tan^2/sigma^2) instead of exp(-tan^2/(2 sigma^2)) (erratum 2)"},
+        {"f00_no_masking", "G left out (erratum 14)"},
+        {"f00_dphi_flipped_180", "dphi = 0 taken for the specular half plane (erratum 13)"},
+    };
+    struct golden t = open_or_fail("golden_traps.csv");
+    for (int i = 0; i < t.rows; i++) {
+        struct brdf_params p = {golden_at(&t, i, "n"), golden_at(&t, i, "k"),
+                                golden_at(&t, i, "sigma"), 1, 0};
+        double want = golden_at(&t, i, "f00_correct");
+        double got = f00_at_deg(&p, golden_at(&t, i, "theta_i_deg"), golden_at(&t, i, "theta_r_deg"),
+                                golden_at(&t, i, "dphi_deg"));
+        if (fabs(got - want) <= 1e-10 * want)
+            continue;
+        for (size_t j = 0; j < sizeof traps / sizeof *traps; j++) {
+            double wrong = golden_at(&t, i, traps[j].column);
+            if (fabs(got - wrong) <= 1e-9 * wrong)
+                fail_msg("row %d: f00 %.17g instead of %.17g: looks like %s", i, got, want,
+                         traps[j].name);
+        }
+        fail_msg("row %d: f00 %.17g instead of %.17g: none of the known misreadings", i, got, want);
+    }
+    golden_close(&t);
+}
+
+static void height_at_specular_goes_as_one_over_sigma_squared(void **state)
+{
+    (void)state;
+    for (double sigma = 0.02; sigma < 0.6; sigma += 0.05) {
+        struct brdf_params p = {1.3, 7.5, sigma, 1, 0};
+        assert_near(f00_at_deg(&p, 45, 45, 180) * sigma * sigma, 0.0725273, 5e-8);
+    }
+}
+
+static double peak_deg(const struct brdf_params *p, double *ret_f00)
+{
+    double best = 0, at = 0;
+    for (int i = 0; i < 89999; i++) {
+        double f = f00_at_deg(p, 45, i / 1000.0, 180);
+        if (f > best) {
+            best = f;
+            at = i / 1000.0;
+        }
+    }
+    *ret_f00 = best;
+    return at;
+}
+
+static void peak_moves_off_specular_and_sticks_at_the_kink_of_g(void **state)
+{
+    (void)state;
+    static const struct {
+        double sigma, at_deg, f00;
+    } fact[] = {{.02, 45.091, 181.460264598}, {.05, 45.583, 29.1570008018}, {.1, 47.577, 7.41535821365},
+                {.15, 52.158, 3.42635838249}, {.2, 75, 2.29001614125},      {.25, 75, 2.02456978647},
+                {.3, 75, 1.67567711247}};
+    for (size_t i = 0; i < sizeof fact / sizeof *fact; i++) {
+        struct brdf_params p = {1.3, 7.5, fact[i].sigma, 1, 0};
+        double f00, at = peak_deg(&p, &f00);
+        assert_near(at, fact[i].at_deg, 0.0011);
+        assert_near(f00 / fact[i].f00, 1, 2e-6);
+    }
+}
+
+static void figure_5_has_the_reference_values_at_45_deg(void **state)
+{
+    (void)state;
+    struct golden t = open_or_fail("fig5_facts.csv");
+    for (int i = 0; i < t.rows; i++) {
+        struct brdf_params p = {golden_at(&t, i, "n"), golden_at(&t, i, "k"),
+                                golden_at(&t, i, "sigma"), 1, 0};
+        double want = golden_at(&t, i, "f00_at_45");
+        assert_near(f00_at_deg(&p, 45, 45, 180) / want, 1, 1e-11); // printed with 12 digits
+    }
+    golden_close(&t);
+}
+
+static void diffuse_part_is_kd_over_cos_or_kd_over_pi(void **state)
+{
+    (void)state;
+    struct brdf_params p = {1.5, 0, 0.1, 0, 0.3};
+    struct brdf_geometry g = brdf_geometry(golden_rad(60), golden_rad(20), 1);
+    assert_near(brdf_f00(&p, BRDF_DIFFUSE_PAPER, &g), 0.6, 1e-15);
+    assert_near(brdf_f00(&p, BRDF_DIFFUSE_LAMBERT, &g), 0.3 / PI, 1e-16);
+}
+
+static double complex_fresnel(double n, double k, double s2, double c2)
+{
+    double complex eps = CMPLX(n, k) * CMPLX(n, k), q = csqrt(eps - s2);
+    double c = sqrt(c2), rs = cabs((c - q) / (c + q)), rp = cabs((eps * c - q) / (eps * c + q));
+    return (rs * rs + rp * rp) / 2;
+}
+
+static void real_fresnel_equals_the_complex_form(void **state)
+{
+    (void)state;
+    static const double n[] = {0.2, 0.72, 0.9, 1.2, 1.5, 5.345, 8}, k[] = {0, 1e-3, 0.2, 1, 7.5};
+    for (size_t i = 0; i < 7; i++)
+        for (size_t j = 0; j < 5; j++)
+            for (double b = 0; b < 90; b += 1.7) {
+                double s2 = pow(sin(golden_rad(b)), 2), c2 = pow(cos(golden_rad(b)), 2);
+                double want = complex_fresnel(n[i], k[j], s2, c2);
+                assert_near(brdf_fresnel_mean(n[i], k[j], s2, c2), want, 2e-14);
+            }
+}
+
+static void fresnel_keeps_its_digits_where_it_nearly_vanishes(void **state)
+{
+    (void)state;
+    double d = 1.0 / (1 << 20); // exactly representable: R(0) = (d / (2 + d))^2
+    assert_near(brdf_fresnel_mean(1 + d, 0, 0, 1) / pow(d / (2 + d), 2), 1, 1e-15);
+    assert_near(brdf_fresnel_mean(1, 0, 0.5, 0.5), 0, 0);
+    assert_near(brdf_fresnel_mean(0.4, 0, 0.5, 0.5), 1, 1e-15); // total reflection
+}
+
+static void outside_the_domain_everything_is_nan(void **state)
+{
+    (void)state;
+    struct brdf_params good = {1.5, 0.1, 0.2, 1, 0.1};
+    static const double angles[][3] = {{-0.1, 0, 0}, {90, 0, 0}, {0, 90, 180}, {0, -1, 180},
+                                       {NAN, 0, 0},  {0, NAN, 0}, {0, 0, NAN}, {0, 0, INFINITY}};
+    for (size_t i = 0; i < sizeof angles / sizeof *angles; i++)
+        assert_true(isnan(f00_at_deg(&good, angles[i][0], angles[i][1], angles[i][2])));
+    static const struct brdf_params bad[] = {
+        {0, 0, .1, 1, 0},  {-1, 0, .1, 1, 0}, {1.5, -1e-9, .1, 1, 0}, {1.5, 0, 0, 1, 0}, {1.5, 0, -.1, 1, 0},
+        {1.5, 0, .1, -1, 0}, {1.5, 0, .1, 1, -1}, {NAN, 0, .1, 1, 0},   {1.5, NAN, .1, 1, 0},
+        {1.5, 0, NAN, 1, 0}, {1.5, 0, .1, NAN, 0}, {1.5, 0, .1, 1, NAN}, {1.5, INFINITY, .1, 1, 0}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_true(isnan(f00_at_deg(&bad[i], 30, 30, 180)));
+        assert_true(isnan(brdf_dhr(&bad[i], BRDF_DIFFUSE_PAPER, 0)));
+    }
+    assert_true(isnan(brdf_dhr(&good, BRDF_DIFFUSE_PAPER, PI / 2)));
+    assert_false(isnan(f00_at_deg(&good, 89.999999, 89.999999, 180)));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(f00_in_plane_equals_the_reference),
+        cmocka_unit_test(f00_out_of_plane_equals_the_reference),
+        cmocka_unit_test(f00_at_the_edges_equals_the_reference),
+        cmocka_unit_test(f00_shares_no_common_misreading_of_the_paper),
+        cmocka_unit_test(height_at_specular_goes_as_one_over_sigma_squared),
+        cmocka_unit_test(peak_moves_off_specular_and_sticks_at_the_kink_of_g),
+        cmocka_unit_test(figure_5_has_the_reference_values_at_45_deg),
+        cmocka_unit_test(diffuse_part_is_kd_over_cos_or_kd_over_pi),
+        cmocka_unit_test(real_fresnel_equals_the_complex_form),
+        cmocka_unit_test(fresnel_keeps_its_digits_where_it_nearly_vanishes),
+        cmocka_unit_test(outside_the_domain_everything_is_nan),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
