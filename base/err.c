@@ -30,8 +30,8 @@ int gon_prefix(struct gon_error *err, const char *fmt, ...)
     int n = vsnprintf(err->text, sizeof err->text, fmt, ap);
     va_end(ap);
     if (n >= 0 && (size_t)n < sizeof err->text)
-        snprintf(err->text + n, sizeof err->text - (size_t)n, ": %s", rest);
-    return err->code;
+        n = snprintf(err->text + n, sizeof err->text - (size_t)n, ": %s", rest);
+    return n < 0 ? GON_E_SYSTEM : (int)err->code;
 }
 
 const char *gon_code_name(enum gon_code code)
