@@ -160,6 +160,7 @@ static void dispatch(struct source *s)
 void loop_run(struct loop *loop)
 {
     struct epoll_event events[16];
+    loop->quit = false;
     int timeout_ms = loop->after ? loop->after(loop->after_ctx) : -1;
     while (!loop->quit) {
         int n = epoll_wait(loop->epoll_fd, events, 16, timeout_ms);

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#include "base/paths.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+static const char *filled(const char *name)
+{
+    const char *value = getenv(name);
+    return value && *value ? value : NULL;
+}
+
+int paths_socket_fits(const char *path, struct gon_error *err)
+{
+    size_t most = sizeof(((struct sockaddr_un *)NULL)->sun_path) - 1;
+    if (!*path)
+        return gon_fail(err, GON_E_INPUT, "the socket's path is empty");
+    if (strlen(path) > most)
+        return gon_fail(err, GON_E_INPUT, "socket path %s is %zu bytes long, at most %zu fit; choose a shorter one with --socket",
+                        path, strlen(path), most);
+    return GON_OK;
+}
+
+int paths_socket(char *ret_path, size_t size, struct gon_error *err)
+{
+    char path[4096];
+    if (filled("GONIO_SOCKET"))
+        snprintf(path, sizeof path, "%s", filled("GONIO_SOCKET"));
+    else if (filled("XDG_RUNTIME_DIR"))
+        snprintf(path, sizeof path, "%s/goniod.sock", filled("XDG_RUNTIME_DIR"));
+    else if (geteuid() == 0)
+        snprintf(path, sizeof path, "/run/goniod.sock");
+    else
+        snprintf(path, sizeof path, "/tmp/goniod-%ld/goniod.sock", (long)geteuid());
+    int rc = paths_socket_fits(path, err);
+    if (rc == 0)
+        snprintf(ret_path, size, "%s", path);
+    return rc;
+}

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// Where the daemon and the command meet when nobody says otherwise. Thread: any.
+#pragma once
+#include "base/err.h"
+
+#include <stddef.h>
+
+// $GONIO_SOCKET, else $XDG_RUNTIME_DIR/goniod.sock, else /run/goniod.sock for root and
+// /tmp/goniod-UID/goniod.sock for others. GON_E_INPUT when it does not fit into a socket's address.
+int paths_socket(char *ret_path, size_t size, struct gon_error *err);
+
+// GON_E_INPUT when the path is empty or longer than the 107 bytes that a socket's address holds.
+int paths_socket_fits(const char *path, struct gon_error *err);

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// HTTP/1.1 over the daemon's Unix socket: requests with small bodies, answered at once or later, and
+// streams of server-sent events. Thread: main; never blocks.
+//
+// Limits: 32 connections (503 beyond), 8 streams (503), 64 KiB of body (413), 8 KiB of header (431), 30 s
+// of silence. A request with both Content-Length and Transfer-Encoding, or with two lengths, is 400: the
+// library would accept it, and two readers could understand it differently.
+#pragma once
+#include "base/err.h"
+#include "daemon/events.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct http;
+struct log;
+struct loop;
+
+struct http_request {
+    const char *method, *path; // path without its query
+    const char *body;          // NUL-terminated; may hold NULs before its end
+    size_t size;
+    long pid, uid;             // of the peer, as the kernel says; -1 unknown
+};
+
+enum { HTTP_LATER = 0, HTTP_STREAM = -1 };
+
+struct http_reply {
+    int status;        // HTTP status; HTTP_LATER: http_answer will follow; HTTP_STREAM: send events
+    char *body;        // JSON text, malloc'ed, taken over; NULL only with the two special ones
+    const char *allow; // static text for the Allow header; NULL: none
+};
+
+struct http_ports {
+    void *ctx;
+    struct http_reply (*request)(void *ctx, const struct http_request *request, uint64_t ticket);
+};
+
+// Serves the listening socket (borrowed) on the loop; streams read from events (borrowed).
+struct http *http_new(struct loop *loop, int listen_fd, const struct events *events,
+                      const struct http_ports *ports, struct log *log, struct gon_error *err);
+void http_free(struct http *h); // ends all connections; requests that wait are answered with 503
+
+// Answers a request left for later; does nothing when its client has gone. Body as in http_reply.
+void http_answer(struct http *h, uint64_t ticket, int status, char *body);
+void http_wake(struct http *h); // events were added
+
+// {"error": what, "where": where, "what_to_do": what_to_do} as malloc'ed text; where may be NULL.
+char *http_error(const char *error, const char *where, const char *what_to_do);
