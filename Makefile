@@ -80,7 +80,8 @@ $(B)/obj/%.o: %.c Makefile
 	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c -o $@ $<
 
 # Numeric kernels are worth the vectoriser; flags are per file because optimize() attributes disable it.
-$(B)/obj/model/%.o $(B)/obj/fit/%.o: CFLAGS += $(if $(filter asan debug,$(VARIANT)),,-O3)
+# Nobody reads the floating-point exception flags, and without them a conditional becomes a maximum.
+$(B)/obj/model/%.o $(B)/obj/fit/%.o: CFLAGS += $(if $(filter asan debug,$(VARIANT)),,-O3 -fno-trapping-math)
 
 # --- tests ----------------------------------------------------------------------------------------
 # tests/unit/test_<module>.c is one program. The layers it needs are named in its first lines: '// uses: fit model'.
