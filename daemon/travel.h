@@ -14,18 +14,18 @@
 #include "daemon/instrument.h"
 
 // User units, indexed by part. NAN: leave that axis where it is.
-struct motion_pose {
+struct travel_pose {
     double at[INSTRUMENT_AXES];
 };
 
 // Moves, waits, and returns where the encoders say that the axes are (NAN for an axis the bench has not).
-int motion_move(struct instrument *in, const struct motion_pose *target, const struct cancel *cancel,
-                struct motion_pose *ret_actual, struct gon_error *err);
+int travel_move(struct instrument *in, const struct travel_pose *target, const struct cancel *cancel,
+                struct travel_pose *ret_actual, struct gon_error *err);
 // The pose of a station by its name; GON_E_INPUT when the bench has none of that name.
-int motion_station(const struct instrument *in, const char *name, struct motion_pose *ret_pose,
+int travel_station(const struct instrument *in, const char *name, struct travel_pose *ret_pose,
                    struct gon_error *err);
 // Homes the axes that say they are not; others stay. An axis with an alarm is GON_E_DEVICE.
-int motion_home(struct instrument *in, const struct cancel *cancel, struct gon_error *err);
-int motion_stop(struct instrument *in, struct gon_error *err); // all of them; the first error
+int travel_home(struct instrument *in, const struct cancel *cancel, struct gon_error *err);
+int travel_stop(struct instrument *in, struct gon_error *err); // all of them; the first error
 // Trapezoidal profile, triangular when short: distance and result without sign.
-double motion_time_s(double distance, double speed, double acceleration);
+double travel_time_s(double distance, double speed, double acceleration);
