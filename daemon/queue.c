@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/queue.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Where the run that has the bench is on its way.
+enum phase { IDLE, OPENING, MEASURING, FITTING, CLOSING };
+
+struct queue {
+    struct queue_ports ports;
+    struct run **runs; // by rising id; each stays where it is, so that pointers do
+    size_t count, room;
+    int *waiting; // ids, first come first served
+    size_t waiting_count;
+    enum phase phase;
+    struct run *active;
+    enum run_state ended_as;
+    bool stopping, ending;
+};
+
+struct queue *queue_new(const struct queue_ports *ports)
+{
+    struct queue *q = calloc(1, sizeof *q);
+    if (q)
+        q->ports = *ports;
+    return q;
+}
+
+void queue_free(struct queue *q)
+{
+    if (!q)
+        return;
+    for (size_t i = 0; i < q->count; i++) {
+        free(q->runs[i]->fit);
+        free(q->runs[i]);
+    }
+    free(q->runs);
+    free(q->waiting);
+    free(q);
+}
+
+static struct run *find(const struct queue *q, int id)
+{
+    for (size_t i = 0; i < q->count; i++)
+        if (q->runs[i]->id == id)
+            return q->runs[i];
+    return NULL;
+}
+
+static bool is_waiting(const struct queue *q, int id)
+{
+    for (size_t i = 0; i < q->waiting_count; i++)
+        if (q->waiting[i] == id)
+            return true;
+    return false;
+}
+
+static bool make_room(struct queue *q)
+{
+    if (q->count < q->room)
+        return true;
+    size_t room = q->room ? 2 * q->room : 16;
+    struct run **runs = realloc(q->runs, room * sizeof *runs);
+    if (runs)
+        q->runs = runs;
+    int *waiting = realloc(q->waiting, room * sizeof *waiting);
+    if (waiting)
+        q->waiting = waiting;
+    if (!runs || !waiting)
+        return false;
+    q->room = room;
+    return true;
+}
+
+struct run *queue_know(struct queue *q, const struct run *run)
+{
+    struct run *known = find(q, run->id);
+    if (known) {
+        if (known != q->active && !is_waiting(q, run->id)) {
+            char *fit = known->fit;
+            *known = *run;
+            known->fit = fit;
+        }
+        return known;
+    }
+    known = make_room(q) ? malloc(sizeof *known) : NULL;
+    if (!known)
+        return NULL;
+    *known = *run;
+    known->fit = NULL;
+    size_t at = q->count++;
+    for (; at > 0 && q->runs[at - 1]->id > run->id; at--)
+        q->runs[at] = q->runs[at - 1];
+    q->runs[at] = known;
+    return known;
+}
+
+static void change(struct queue *q, struct run *run, enum run_state state, const char *text)
+{
+    run->state = state;
+    snprintf(run->text, sizeof run->text, "%s", text ? text : "");
+    if (state == RUN_DONE || state == RUN_FAILED || state == RUN_STOPPED)
+        run->emission = false;
+    q->ports.changed(q->ports.ctx, run);
+}
+
+static void next(struct queue *q)
+{
+    if (q->active || !q->waiting_count || q->ending)
+        return;
+    q->active = find(q, q->waiting[0]);
+    memmove(q->waiting, q->waiting + 1, --q->waiting_count * sizeof *q->waiting);
+    q->phase = OPENING;
+    q->ports.open(q->ports.ctx, q->active);
+}
+
+int queue_submit(struct queue *q, int id, struct gon_error *err)
+{
+    struct run *run = find(q, id);
+    if (q->ending)
+        return gon_fail(err, GON_E_REFUSED, "the daemon is ending; start it again");
+    if (!run)
+        return gon_fail(err, GON_E_INPUT, "there is no run %d; see: gonio list", id);
+    if (run == q->active || is_waiting(q, id))
+        return gon_fail(err, GON_E_REFUSED, "run %d is %s already; see: gonio watch", id,
+                        run_state_name(run->state));
+    if (run->state == RUN_DONE)
+        return gon_fail(err, GON_E_REFUSED, "run %d is done; see: gonio show %d", id, id);
+    q->waiting[q->waiting_count++] = id; // there is room for every known run
+    run->fits_open = 0;
+    run->fit_failed = false;
+    change(q, run, RUN_QUEUED, NULL);
+    next(q);
+    return GON_OK;
+}
+
+static void put_back(struct queue *q, const char *why)
+{
+    while (q->waiting_count) {
+        struct run *run = find(q, q->waiting[--q->waiting_count]);
+        change(q, run, RUN_STOPPED, why);
+    }
+}
+
+bool queue_stop(struct queue *q, const char *why)
+{
+    bool any = q->active || q->waiting_count;
+    put_back(q, why);
+    if (q->active && q->phase < CLOSING && !q->stopping) {
+        q->stopping = true;
+        q->ports.cancel(q->ports.ctx);
+        change(q, q->active, RUN_STOPPING, why);
+    }
+    return any;
+}
+
+void queue_end(struct queue *q)
+{
+    q->ending = true;
+    queue_stop(q, "the daemon ended");
+}
+
+static void finish(struct queue *q, enum run_state state, const char *text)
+{
+    struct run *run = q->active;
+    bool stopped = q->stopping;
+    q->active = NULL;
+    q->phase = IDLE;
+    q->stopping = false;
+    if (stopped)
+        q->ports.rearm(q->ports.ctx);
+    change(q, run, state, text);
+    next(q);
+}
+
+// Measured, and no fit is under way: the file can be closed.
+static void close_if_ready(struct queue *q)
+{
+    if (q->phase != FITTING || q->active->fits_open > 0)
+        return;
+    q->phase = CLOSING;
+    q->ports.close(q->ports.ctx, q->active, q->ended_as);
+}
+
+void queue_opened(struct queue *q, int id, void *material, const struct gon_error *err)
+{
+    assert(q->phase == OPENING && q->active->id == id);
+    if (!material) {
+        finish(q, q->stopping ? RUN_STOPPED : RUN_FAILED, err ? err->text : "");
+        return;
+    }
+    q->phase = MEASURING;
+    q->ports.start(q->ports.ctx, q->active, material); // also when stopping: the engine then ends at once
+}
+
+void queue_engine_event(struct queue *q, int id, const struct engine_event *event)
+{
+    struct run *run = find(q, id);
+    if (!run || run != q->active)
+        return;
+    run->emission = event->emission;
+    run->left_s = event->left_s;
+    run->sweeps = event->sweeps;
+    run->sweep = event->sweep;
+    run->point = event->point;
+    run->points = event->points;
+    if (event->kind == ENGINE_READING) {
+        run->theta_i_deg = event->theta_i_deg;
+        run->theta_r_deg = event->theta_r_deg;
+        run->f_per_sr = event->f_per_sr;
+        run->u_per_sr = event->u_per_sr;
+        run->flags = event->flags;
+    }
+    // How it ends is said when the file is closed, and a stop under way is not taken back.
+    bool ends = event->state == RUN_DONE || event->state == RUN_STOPPED || event->state == RUN_FAILED;
+    if (event->kind == ENGINE_STATE && !ends && !q->stopping)
+        change(q, run, event->state, event->text);
+}
+
+void queue_fit_asked(struct queue *q, int id, int sweep, bool last)
+{
+    struct run *run = find(q, id);
+    if (!run || run != q->active)
+        return;
+    run->fits_open++;
+    q->ports.fit(q->ports.ctx, run, sweep, last);
+}
+
+void queue_fitted(struct queue *q, int id, const char *fit, const struct gon_error *err)
+{
+    struct run *run = find(q, id);
+    if (!run || run != q->active)
+        return;
+    assert(run->fits_open > 0);
+    run->fits_open--;
+    run->fit_failed = !fit && !(err && err->code == GON_E_CANCELED);
+    if (fit) {
+        free(run->fit);
+        run->fit = strdup(fit);
+    }
+    close_if_ready(q);
+}
+
+void queue_ended(struct queue *q, int id, enum run_state state, const struct gon_error *err)
+{
+    assert(q->phase == MEASURING && q->active->id == id);
+    q->phase = FITTING;
+    q->ended_as = state;
+    if (state != RUN_DONE && err && !q->stopping)
+        snprintf(q->active->text, sizeof q->active->text, "%s", err->text);
+    close_if_ready(q);
+}
+
+void queue_closed(struct queue *q, int id, const struct gon_error *err)
+{
+    assert(q->phase == CLOSING && q->active->id == id);
+    if (err) {
+        finish(q, RUN_FAILED, err->text);
+    } else {
+        char text[sizeof q->active->text];
+        snprintf(text, sizeof text, "%s", q->ended_as == RUN_DONE ? "" : q->active->text);
+        finish(q, q->ended_as, text);
+    }
+}
+
+const struct run *queue_active(const struct queue *q)
+{
+    return q->active;
+}
+
+const struct run *queue_run(const struct queue *q, int id)
+{
+    return find(q, id);
+}
+
+const struct run *queue_at(const struct queue *q, size_t index)
+{
+    return index < q->count ? q->runs[index] : NULL;
+}
+
+bool queue_idle(const struct queue *q)
+{
+    return !q->active;
+}
