@@ -15,10 +15,15 @@
 #include "daemon/instrument.h"
 
 #define ACQUIRE_RESIDUAL 1e-4
-#define ACQUIRE_UNDER 0.2 // of the next smaller range's full scale: below it the range goes down
+#define ACQUIRE_UNDER 0.2  // of the next smaller range's full scale: below it the next reading goes down
+#define ACQUIRE_POOR 0.01  // of its own full scale: below it the reading is made again, further down
 
+// Where the ranging stands. Start with {.range = -1}; acquire_begin before each point.
 struct acquire {
-    int range;            // to begin with; -1: the least sensitive. Follows the readings
+    int range;            // of the next attempt; -1: the least sensitive
+    int least_range;      // at this point anything more sensitive saturated
+    int ups;              // ranges gone up at this point: the steps double
+    int64_t range_ns;     // when the range was last changed
     double last_signal_v; // of the reading before, for the settling; 0: none
 };
 
@@ -38,9 +43,9 @@ struct acquire_reading {
     bool again;           // not accepted, and another attempt may mend it (the range was changed in acquire)
 };
 
+void acquire_begin(struct acquire *a);
 // GON_E_LINK and GON_E_GONE: the detector went away and nothing was measured.
 int acquire_attempt(struct instrument *in, struct acquire *a, const struct acquire_wish *wish,
                     const struct cancel *cancel, struct acquire_reading *ret_reading,
                     struct gon_error *err);
-double acquire_settle_s(double time_constant_s, int slope_db, double residual);
 double acquire_spacing_s(double time_constant_s, int slope_db);

@@ -32,9 +32,9 @@ enum instrument_part {
     PART_SAMPLE, // optional
     PART_LASER,
     PART_DETECTOR,
-    PART_COUNT
+    PART_COUNT,
+    INSTRUMENT_AXES = PART_LASER // the first parts are the axes
 };
-enum { INSTRUMENT_AXES = PART_SAMPLE + 1 }; // the first parts are the axes
 
 enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 
@@ -93,11 +93,13 @@ int instrument_wait(struct instrument *in, int64_t until_ns, const struct cancel
 // least every 100 ms.
 void instrument_breathe(struct instrument *in);
 int64_t instrument_now_ns(const struct instrument *in);
+int64_t instrument_utc_ns(const struct instrument *in);
 
 // For an instrument that runs nothing, about once a second: asks every part that is there how it is and
 // tries once to bring back one that is lost (paced, 0.2 to 2 s). Repeats an unconfirmed off. Returns the
-// number of parts lost.
+// number of parts lost. instrument_reconnect is the second half alone.
 int instrument_tend(struct instrument *in);
+int instrument_reconnect(struct instrument *in);
 
 // A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off, an
 // axis stopped, a detector set up as configured. 0 when it is there.
@@ -120,6 +122,9 @@ int instrument_place(struct instrument *in, enum instrument_part part, struct ax
 int instrument_go(struct instrument *in, enum instrument_part part, double position, struct gon_error *err);
 int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err);
 int instrument_halt(struct instrument *in, enum instrument_part part, struct gon_error *err);
+// Whether the last moves took up the play so that the load is where the encoder says: it went up by at
+// least the backlash since it last went down, was stopped or was homed. Always true without backlash.
+bool instrument_engaged(const struct instrument *in, enum instrument_part part);
 // The position nearest to the one asked that is a whole number of steps.
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position);
 

@@ -29,7 +29,8 @@ void safety_free(struct safety *s); // off first, as well as the link allows
 
 // First contact, and after every reopening: off with read back, then who it is. ret_text may be NULL.
 int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error *err);
-int safety_reopen(struct safety *s, struct gon_error *err); // one try at the link, then safety_begin
+// One try at the link, then safety_begin.
+int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_error *err);
 
 void safety_permit(struct safety *s, bool running); // a run begins or ends; ending sends nothing itself
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err);

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/acquire.h"
+
+#include "campaign/bench.h"
+#include "campaign/store.h"
+
+#include <math.h>
+
+#define SATURATED 0.95    // of full scale
+#define HEADROOM 2.0      // of a range chosen for a known signal
+#define SAMPLE_TRIES 3    // for one answer that is not a number
+#define CORRELATION 0.05  // of neighbouring samples
+
+// Correlation of white noise behind n equal poles, x time constants apart.
+static double correlation(int poles, double x)
+{
+    switch (poles) {
+    case 1: return exp(-x);
+    case 2: return (1.0 + x) * exp(-x);
+    case 3: return (1.0 + x + x * x / 3.0) * exp(-x);
+    default: return (1.0 + x + 0.4 * x * x + x * x * x / 15.0) * exp(-x);
+    }
+}
+
+double acquire_spacing_s(double time_constant_s, int slope_db)
+{
+    const int poles = slope_db / 6;
+    double near = 0, far = 30;
+    for (int i = 0; i < 40; i++) { // bisection: it falls monotonically
+        const double x = 0.5 * (near + far);
+        if (correlation(poles, x) > CORRELATION)
+            near = x;
+        else
+            far = x;
+    }
+    return far * time_constant_s;
+}
+
+void acquire_begin(struct acquire *a)
+{
+    a->least_range = 0;
+    a->ups = 0;
+}
+
+static int change_range(struct instrument *in, struct acquire *a, struct gon_error *err)
+{
+    const int ranges = instrument_ranges(in);
+    if (a->range < 0 || a->range >= ranges)
+        a->range = ranges - 1;
+    if (instrument_range(in) == a->range)
+        return 0;
+    int rc = instrument_set_range(in, a->range, err);
+    a->range_ns = instrument_now_ns(in);
+    return rc;
+}
+
+static int settle(struct instrument *in, const struct acquire *a, int64_t since_ns,
+                  const struct cancel *cancel, struct gon_error *err)
+{
+    const int slope_db = instrument_bench(in)->detector.slope_db;
+    const double tc_s = instrument_time_constant_s(in);
+    const double full_v = instrument_full_scale_v(in, a->range);
+    const double fall = a->last_signal_v > full_v ? full_v / a->last_signal_v : 1.0;
+    const int64_t light_ns =
+        since_ns + CLK_S(detector_settle_s(tc_s, slope_db, ACQUIRE_RESIDUAL * fall));
+    const int64_t range_ns =
+        a->range_ns + CLK_S(detector_settle_s(tc_s, slope_db, ACQUIRE_RESIDUAL));
+    if (instrument_wait(in, light_ns > range_ns ? light_ns : range_ns, cancel) < 0)
+        return gon_fail(err, GON_E_CANCELED, "stopped while settling");
+    return 0;
+}
+
+// An answer that is no number is never one: asked again, and after that an error.
+static int sample(struct instrument *in, struct detector_sample *ret_sample, struct gon_error *err)
+{
+    int rc = 0;
+    for (int i = 0; i < SAMPLE_TRIES; i++) {
+        rc = instrument_sample(in, ret_sample, err);
+        if (rc != GON_E_LINK)
+            break;
+        instrument_breathe(in);
+    }
+    if (rc >= 0 && !isfinite(ret_sample->signal_v))
+        return gon_fail(err, GON_E_LINK, "detector: answered something that is not a number");
+    return rc;
+}
+
+// Welford's running mean and sum of squares.
+struct tally {
+    int n;
+    double mean, squares;
+};
+
+static void add(struct tally *t, double x)
+{
+    const double d = x - t->mean;
+    t->n++;
+    t->mean += d / t->n;
+    t->squares += d * (x - t->mean);
+}
+
+static double sd(const struct tally *t)
+{
+    return t->n > 1 ? sqrt(t->squares / (t->n - 1)) : 0.0;
+}
+
+// Saturated samples end it: more of them say nothing more.
+static int take_samples(struct instrument *in, const struct acquire *a, const struct acquire_wish *wish,
+                        const struct cancel *cancel, struct acquire_reading *r, struct gon_error *err)
+{
+    const double full_v = instrument_full_scale_v(in, a->range);
+    const int64_t spacing_ns = CLK_S(acquire_spacing_s(instrument_time_constant_s(in),
+                                                       instrument_bench(in)->detector.slope_db));
+    struct tally signal = {0}, monitor = {0};
+    int64_t next_ns = instrument_now_ns(in);
+    r->utc_ns = instrument_utc_ns(in);
+    for (int k = 0; k < wish->count && !(r->flags & STORE_SATURATED); k++, next_ns += spacing_ns) {
+        struct detector_sample s;
+        if (instrument_wait(in, next_ns, cancel) < 0)
+            return gon_fail(err, GON_E_CANCELED, "stopped while reading");
+        int rc = sample(in, &s, err);
+        if (rc < 0)
+            return rc;
+        add(&signal, s.signal_v);
+        add(&monitor, s.monitor_v);
+        if (fabs(s.signal_v) >= SATURATED * full_v)
+            r->flags |= STORE_SATURATED;
+        if (s.monitor_v < wish->monitor_least_v)
+            r->flags |= STORE_MONITOR_LOW;
+        if (next_ns < instrument_now_ns(in)) // never closer than the spacing, also after a slow answer
+            next_ns = instrument_now_ns(in);
+    }
+    r->count = signal.n;
+    r->signal_v = signal.mean;
+    r->signal_sd_v = sd(&signal);
+    r->monitor_v = monitor.mean;
+    r->monitor_sd_v = sd(&monitor);
+    return 0;
+}
+
+static int fitting_range(struct instrument *in, const struct acquire *a, const struct acquire_reading *r)
+{
+    const double need_v = HEADROOM * (fabs(r->signal_v) + 3.0 * r->signal_sd_v);
+    int range = a->least_range;
+    while (range < r->range && instrument_full_scale_v(in, range) < need_v)
+        range++;
+    return range;
+}
+
+// What the reading says about the range of the next one, and whether it is itself good.
+static void judge(struct instrument *in, struct acquire *a, struct acquire_reading *r)
+{
+    const double signal_v = fabs(r->signal_v) + 3.0 * r->signal_sd_v;
+    const int top = instrument_ranges(in) - 1;
+    a->last_signal_v = fabs(r->signal_v);
+    if (r->flags & STORE_SATURATED) {
+        a->last_signal_v = instrument_full_scale_v(in, r->range);
+        r->again = r->range < top;
+        a->least_range = r->range + 1 < top ? r->range + 1 : top;
+        a->range = r->range + (1 << a->ups) < top ? r->range + (1 << a->ups) : top;
+        a->ups += a->ups < 3;
+    } else if (r->flags & (STORE_MONITOR_LOW)) {
+        r->again = false; // the laser has to be looked at first
+    } else if (r->flags & (STORE_UNLOCKED | STORE_UNSETTLED)) {
+        r->again = true;
+    } else {
+        r->accepted = true;
+        if (r->range > a->least_range &&
+            signal_v < ACQUIRE_UNDER * instrument_full_scale_v(in, r->range - 1))
+            a->range = fitting_range(in, a, r);
+        if (a->range < r->range && signal_v < ACQUIRE_POOR * instrument_full_scale_v(in, r->range)) {
+            r->flags |= STORE_UNDER_RANGE;
+            r->accepted = false;
+            r->again = true;
+        }
+    }
+}
+
+static unsigned store_flags(unsigned condition)
+{
+    return (condition & DETECTOR_SATURATED ? STORE_SATURATED : 0) |
+           (condition & DETECTOR_UNLOCKED ? STORE_UNLOCKED : 0) |
+           (condition & DETECTOR_UNSETTLED ? STORE_UNSETTLED : 0);
+}
+
+int acquire_attempt(struct instrument *in, struct acquire *a, const struct acquire_wish *wish,
+                    const struct cancel *cancel, struct acquire_reading *ret_reading,
+                    struct gon_error *err)
+{
+    struct acquire_reading r = {0};
+    unsigned condition = 0;
+    int rc = change_range(in, a, err);
+    r.range = a->range;
+    if (rc >= 0)
+        rc = settle(in, a, wish->since_ns, cancel, err);
+    if (rc >= 0) // clears what happened on the way
+        rc = instrument_condition(in, &condition, err);
+    if (rc >= 0)
+        rc = take_samples(in, a, wish, cancel, &r, err);
+    if (rc >= 0)
+        rc = instrument_condition(in, &condition, err);
+    if (rc < 0)
+        return rc;
+    r.flags |= store_flags(condition);
+    judge(in, a, &r);
+    *ret_reading = r;
+    return 0;
+}

@@ -1,0 +1,657 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/instrument.h"
+
+#include "campaign/bench.h"
+#include "drivers/bus.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SLICE_NS CLK_MS(100)
+#define BACKOFF_LEAST_NS CLK_MS(200)
+#define BACKOFF_MOST_NS CLK_S(2)
+#define QUIET_MS 100 // the slowest answer of a unit that is to be drained after an error
+
+// The clock that drivers and waits use: its sleeping renews the laser's lease.
+struct breathing {
+    struct clk clk;
+    struct clk *inner;
+    struct instrument *in;
+};
+
+struct motor {
+    const struct bench_axis *config;
+    struct axis *axis;
+    int bus; // index; -1: made from ready objects
+    struct axis_place place;
+    double commanded; // last target sent; NAN: none, or stopped since
+    bool engaged;
+};
+
+struct instrument {
+    const struct bench_config *bench;
+    struct breathing breathing;
+    void (*watcher)(void *ctx);
+    void *watcher_ctx;
+
+    struct part_state part[PART_COUNT];
+    int64_t retry_ns[PART_COUNT], backoff_ns[PART_COUNT];
+
+    struct bus *bus[BENCH_BUSES_MOST];
+    struct motor motor[INSTRUMENT_AXES];
+    struct safety *safety;
+    struct laser_status laser;
+    struct detector *detector;
+    int range;
+    double time_constant_s;
+    struct detector_sample sample;
+};
+
+static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser", "detector"};
+
+// --- time -------------------------------------------------------------------------------------------
+
+static int64_t breathing_now_ns(const struct clk *clk)
+{
+    return clk_now_ns(((const struct breathing *)clk)->inner);
+}
+
+static int64_t breathing_utc_ns(const struct clk *clk)
+{
+    return clk_utc_ns(((const struct breathing *)clk)->inner);
+}
+
+static void breathing_sleep_until(struct clk *clk, int64_t t_ns, const struct cancel *cancel)
+{
+    struct breathing *b = (struct breathing *)clk;
+    instrument_breathe(b->in);
+    for (int64_t now_ns; (now_ns = clk_now_ns(b->inner)) < t_ns;) {
+        const int64_t slice_ns = now_ns + SLICE_NS;
+        if (clk_sleep_until(b->inner, t_ns < slice_ns ? t_ns : slice_ns, cancel) < 0)
+            return;
+        instrument_breathe(b->in);
+    }
+}
+
+void instrument_breathe(struct instrument *in)
+{
+    if (in->safety)
+        safety_tick(in->safety);
+    if (in->watcher)
+        in->watcher(in->watcher_ctx);
+}
+
+int instrument_wait(struct instrument *in, int64_t until_ns, const struct cancel *cancel)
+{
+    return clk_sleep_until(&in->breathing.clk, until_ns, cancel);
+}
+
+int64_t instrument_now_ns(const struct instrument *in)
+{
+    return clk_now_ns(in->breathing.inner);
+}
+
+int64_t instrument_utc_ns(const struct instrument *in)
+{
+    return clk_utc_ns(in->breathing.inner);
+}
+
+void instrument_watch(struct instrument *in, void (*watcher)(void *ctx), void *ctx)
+{
+    in->watcher = watcher;
+    in->watcher_ctx = ctx;
+}
+
+// --- links ------------------------------------------------------------------------------------------
+
+// Keeps the part's book: what came of a call to it. Puts its name before the error's text.
+static int note(struct instrument *in, enum instrument_part part, int rc, struct gon_error *err)
+{
+    struct part_state *p = &in->part[part];
+    if (rc >= 0) {
+        if (p->link == PART_LOST)
+            p->returns++;
+        p->link = PART_OK;
+        p->problem[0] = 0;
+        in->backoff_ns[part] = 0;
+        return rc;
+    }
+    p->errors++;
+    err->code = (enum gon_code)rc;
+    gon_prefix(err, "%s%s", part < INSTRUMENT_AXES ? "axis " : "", p->name);
+    if (rc == GON_E_LINK || rc == GON_E_GONE) {
+        p->link = PART_LOST;
+        snprintf(p->problem, sizeof p->problem, "%.*s", (int)sizeof p->problem - 1, err->text);
+    }
+    return rc;
+}
+
+static bool is_part_there(const struct instrument *in, enum instrument_part part)
+{
+    return part < INSTRUMENT_AXES ? in->motor[part].axis != NULL
+           : part == PART_LASER   ? in->safety != NULL
+                                  : in->detector != NULL;
+}
+
+// 0 when the part's object exists, so that it can be asked at all.
+static int need(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    assert(in->part[part].link != PART_ABSENT);
+    if (is_part_there(in, part))
+        return 0;
+    return note(in, part, gon_fail(err, GON_E_GONE, "not there (%s)", in->part[part].address), err);
+}
+
+bool instrument_has(const struct instrument *in, enum instrument_part part)
+{
+    return in->part[part].link != PART_ABSENT;
+}
+
+enum instrument_part instrument_lost(const struct instrument *in)
+{
+    enum instrument_part part = 0;
+    while (part < PART_COUNT && in->part[part].link != PART_LOST)
+        part++;
+    return part;
+}
+
+static int connect_bus(struct instrument *in, struct motor *m, int unit, struct gon_error *err)
+{
+    const struct bench_bus *config = &in->bench->buses[m->bus];
+    struct bus **bus = &in->bus[m->bus];
+    int rc = *bus ? bus_reopen(*bus, err)
+                  : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL, bus,
+                             err);
+    if (rc >= 0 && !m->axis && !(m->axis = axis_az_new(*bus, unit)))
+        return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    return rc;
+}
+
+// Units share their bus: the bus is only reopened when the unit does not answer on it as it is.
+static int connect_axis(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    struct motor *m = &in->motor[part];
+    if (!m->axis && m->bus >= 0 && in->bus[m->bus] &&
+        !(m->axis = axis_az_new(in->bus[m->bus], m->config->unit)))
+        return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    int rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
+    if (rc < 0 && m->bus >= 0) {
+        rc = connect_bus(in, m, m->config->unit, err);
+        if (rc >= 0)
+            rc = m->axis->ops->identify(m->axis, err);
+    }
+    if (rc < 0)
+        return rc;
+    m->engaged = m->config->backlash <= 0;
+    m->commanded = NAN;
+    return m->axis->ops->stop(m->axis, err);
+}
+
+static int connect_laser(struct instrument *in, struct gon_error *err)
+{
+    struct part_state *p = &in->part[PART_LASER];
+    struct laser *laser;
+    if (in->safety)
+        return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
+    int rc = laser_cobolt_open(in->bench->laser.link, &in->breathing.clk, NULL, &laser, err);
+    if (rc < 0)
+        return rc;
+    if (!(in->safety = safety_new(laser, &in->breathing.clk)))
+        return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    return safety_begin(in->safety, p->identity, sizeof p->identity, err);
+}
+
+static int connect_detector(struct instrument *in, struct gon_error *err)
+{
+    const struct bench_detector *config = &in->bench->detector;
+    struct part_state *p = &in->part[PART_DETECTOR];
+    int rc = 0;
+    if (!in->detector)
+        rc = detector_sr830_open(config->link, &in->breathing.clk, NULL, &in->detector, err);
+    else
+        rc = in->detector->ops->reopen(in->detector, err);
+    if (rc >= 0)
+        rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
+    const struct detector_setup setup = {config->time_constant_s, config->slope_db, config->monitor_aux};
+    in->range = -1;
+    if (rc >= 0)
+        rc = in->detector->ops->setup(in->detector, &setup, &in->time_constant_s, err);
+    return rc;
+}
+
+int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    *err = (struct gon_error){0};
+    int rc = part < INSTRUMENT_AXES ? connect_axis(in, part, err)
+             : part == PART_LASER   ? connect_laser(in, err)
+                                    : connect_detector(in, err);
+    rc = note(in, part, rc, err);
+    if (rc >= 0)
+        return 0;
+    // Whatever the reason was: it is not usable, and trying again may help.
+    in->part[part].link = PART_LOST;
+    snprintf(in->part[part].problem, sizeof in->part[part].problem, "%.*s",
+             (int)sizeof in->part[part].problem - 1, err->text);
+    return rc;
+}
+
+// --- construction -----------------------------------------------------------------------------------
+
+static const struct bench_axis *find_axis(const struct bench_config *bench, const char *name)
+{
+    for (int i = 0; i < bench->axes_count; i++)
+        if (strcmp(bench->axes[i].name, name) == 0)
+            return &bench->axes[i];
+    return NULL;
+}
+
+static int find_bus(const struct bench_config *bench, const char *name)
+{
+    for (int i = 0; i < bench->buses_count; i++)
+        if (strcmp(bench->buses[i].name, name) == 0)
+            return i;
+    return -1;
+}
+
+static struct instrument *make(const struct bench_config *bench, struct clk *clk)
+{
+    static const struct clk_ops ops = {breathing_now_ns, breathing_utc_ns, breathing_sleep_until};
+    struct instrument *in = calloc(1, sizeof *in);
+    if (!in)
+        return NULL;
+    in->bench = bench;
+    in->breathing = (struct breathing){{&ops}, clk, in};
+    in->range = -1;
+    in->time_constant_s = bench->detector.time_constant_s;
+    in->sample = (struct detector_sample){NAN, NAN, NAN};
+    in->laser = (struct laser_status){.power_w = NAN, .setpoint_w = NAN};
+    for (enum instrument_part part = 0; part < PART_COUNT; part++)
+        in->part[part] = (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
+        struct motor *m = &in->motor[part];
+        *m = (struct motor){.config = find_axis(bench, part_names[part]), .bus = -1, .commanded = NAN,
+                            .place = {.position = NAN, .target = NAN}};
+        if (!m->config)
+            in->part[part].link = PART_ABSENT;
+    }
+    return in;
+}
+
+// The laser first: its first bytes are OFF, and nothing moves before.
+static int hand_over(struct instrument *in, struct instrument **ret_instrument, struct gon_error *err)
+{
+    static const enum instrument_part order[PART_COUNT] = {PART_LASER, PART_THETA_I, PART_THETA_R,
+                                                           PART_SAMPLE, PART_DETECTOR};
+    for (int i = 0; i < PART_COUNT; i++) {
+        struct gon_error own;
+        if (!instrument_has(in, order[i]))
+            continue;
+        int rc = instrument_connect(in, order[i], &own);
+        if (rc == GON_E_INPUT || rc == GON_E_SYSTEM) {
+            instrument_free(in);
+            return gon_fail(err, (enum gon_code)rc, "%s", own.text);
+        }
+    }
+    *ret_instrument = in;
+    return 0;
+}
+
+int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts, struct clk *clk,
+                   struct instrument **ret_instrument, struct gon_error *err)
+{
+    struct instrument *in = make(bench, clk);
+    if (!in)
+        return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
+    for (int i = 0; i < INSTRUMENT_AXES; i++) {
+        in->motor[i].axis = parts->axis[i];
+        if (!parts->axis[i])
+            in->part[i].link = PART_ABSENT;
+    }
+    in->detector = parts->detector;
+    if (!(in->safety = safety_new(parts->laser, &in->breathing.clk))) {
+        instrument_free(in);
+        return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
+    }
+    return hand_over(in, ret_instrument, err);
+}
+
+int instrument_open(const struct bench_config *bench, struct clk *clk, struct instrument **ret_instrument,
+                    struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    struct instrument *in = make(bench, clk);
+    if (!in)
+        return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++)
+        if (instrument_has(in, part)) {
+            in->motor[part].bus = find_bus(bench, in->motor[part].config->bus);
+            in->part[part].address = bench->buses[in->motor[part].bus].link;
+        }
+    in->part[PART_LASER].address = bench->laser.link;
+    in->part[PART_DETECTOR].address = bench->detector.link;
+    return hand_over(in, ret_instrument, err);
+}
+
+void instrument_free(struct instrument *in)
+{
+    if (!in)
+        return;
+    in->watcher = NULL;
+    safety_free(in->safety);
+    in->safety = NULL;
+    for (int i = 0; i < INSTRUMENT_AXES; i++)
+        if (in->motor[i].axis) {
+            in->motor[i].axis->ops->stop(in->motor[i].axis, NULL);
+            in->motor[i].axis->ops->free(in->motor[i].axis);
+        }
+    for (int i = 0; i < BENCH_BUSES_MOST; i++)
+        bus_close(in->bus[i]);
+    if (in->detector)
+        in->detector->ops->free(in->detector);
+    free(in);
+}
+
+const struct bench_config *instrument_bench(const struct instrument *in)
+{
+    return in->bench;
+}
+
+void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot)
+{
+    struct instrument_snapshot *s = ret_snapshot;
+    *s = (struct instrument_snapshot){
+        .t_ns = instrument_now_ns(in),
+        .laser = in->laser,
+        .emission = in->safety && safety_emission(in->safety),
+        .off_unconfirmed = in->safety && safety_pending(in->safety),
+        .range = in->range,
+        .full_scale_v = in->range >= 0 ? instrument_full_scale_v(in, in->range) : (double)NAN,
+        .signal_v = in->sample.signal_v,
+        .monitor_v = in->sample.monitor_v,
+        .time_constant_s = in->time_constant_s,
+    };
+    memcpy(s->part, in->part, sizeof s->part);
+    for (int i = 0; i < INSTRUMENT_AXES; i++) {
+        const struct motor *m = &in->motor[i];
+        s->axis[i].unit = m->config ? m->config->unit_name : "";
+        s->axis[i].position = m->place.position;
+        s->axis[i].target = m->commanded;
+        s->axis[i].moving = m->place.moving;
+        s->axis[i].homed = m->place.homed;
+        s->axis[i].alarm = m->place.alarm;
+        s->axis[i].alarm_code = m->place.alarm_code;
+    }
+}
+
+// --- an instrument that runs nothing -----------------------------------------------------------------
+
+static void ask(struct instrument *in, enum instrument_part part)
+{
+    struct axis_place place;
+    struct laser_status laser;
+    struct detector_sample sample;
+    if (part < INSTRUMENT_AXES)
+        instrument_place(in, part, &place, NULL);
+    else if (part == PART_DETECTOR)
+        instrument_sample(in, &sample, NULL);
+    else if (safety_pending(in->safety) ||
+             (instrument_laser(in, &laser, NULL) >= 0 && laser.emission && !safety_emission(in->safety)))
+        instrument_emission_off(in, NULL);
+}
+
+static void try_again(struct instrument *in, enum instrument_part part)
+{
+    const int64_t now_ns = instrument_now_ns(in);
+    if (now_ns < in->retry_ns[part] || instrument_connect(in, part, NULL) >= 0)
+        return;
+    int64_t *backoff_ns = &in->backoff_ns[part];
+    *backoff_ns = *backoff_ns ? 2 * *backoff_ns : BACKOFF_LEAST_NS;
+    if (*backoff_ns > BACKOFF_MOST_NS)
+        *backoff_ns = BACKOFF_MOST_NS;
+    in->retry_ns[part] = instrument_now_ns(in) + *backoff_ns;
+}
+
+int instrument_reconnect(struct instrument *in)
+{
+    int lost = 0;
+    for (enum instrument_part part = 0; part < PART_COUNT; part++) {
+        if (in->part[part].link == PART_LOST)
+            try_again(in, part);
+        lost += in->part[part].link == PART_LOST;
+    }
+    return lost;
+}
+
+int instrument_tend(struct instrument *in)
+{
+    for (enum instrument_part part = 0; part < PART_COUNT; part++)
+        if (in->part[part].link == PART_OK)
+            ask(in, part);
+    return instrument_reconnect(in);
+}
+
+// --- axes ---------------------------------------------------------------------------------------------
+
+const struct bench_axis *instrument_axis(const struct instrument *in, enum instrument_part part)
+{
+    return in->motor[part].config;
+}
+
+static int32_t to_steps(const struct bench_axis *c, double position)
+{
+    return (int32_t)lround((position + c->zero) * c->steps_per_unit);
+}
+
+static double of_steps(const struct bench_axis *c, int32_t steps)
+{
+    return steps / c->steps_per_unit - c->zero;
+}
+
+double instrument_rounded(const struct instrument *in, enum instrument_part part, double position)
+{
+    const struct bench_axis *c = in->motor[part].config;
+    return of_steps(c, to_steps(c, position));
+}
+
+bool instrument_engaged(const struct instrument *in, enum instrument_part part)
+{
+    return in->motor[part].engaged;
+}
+
+int instrument_place(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
+                     struct gon_error *err)
+{
+    struct motor *m = &in->motor[part];
+    struct gon_error own;
+    struct axis_status s;
+    err = err ? err : &own;
+    int rc = need(in, part, err);
+    if (rc < 0)
+        return rc;
+    rc = note(in, part, m->axis->ops->status(m->axis, &s, err), err);
+    if (rc < 0)
+        return rc;
+    m->place = (struct axis_place){
+        .position = of_steps(m->config, s.position_steps),
+        .target = m->commanded,
+        .moving = s.moving,
+        .in_position = s.in_position,
+        .ready = s.ready,
+        .homed = s.homed,
+        .alarm = s.alarm,
+        .alarm_code = s.alarm_code,
+        .alarm_text = s.alarm ? m->axis->ops->alarm_text(s.alarm_code) : "",
+    };
+    *ret_place = m->place;
+    return 0;
+}
+
+int instrument_go(struct instrument *in, enum instrument_part part, double position, struct gon_error *err)
+{
+    struct motor *m = &in->motor[part];
+    const struct bench_axis *c = m->config;
+    struct gon_error own;
+    err = err ? err : &own;
+    if (!(position >= c->min - 1e-9 && position <= c->max + 1e-9))
+        return gon_fail(err, GON_E_INPUT, "axis %s: %.4f %s is outside its travel %g..%g %s", c->name,
+                        position, c->unit_name, c->min, c->max, c->unit_name);
+    int rc = need(in, part, err);
+    if (rc < 0)
+        return rc;
+    const double rise = position - m->place.position;
+    m->commanded = instrument_rounded(in, part, position);
+    if (c->backlash > 0)
+        m->engaged = rise >= 0 && (m->engaged || rise >= c->backlash);
+    rc = m->axis->ops->move_abs(m->axis, to_steps(c, position),
+                                (int32_t)lround(c->speed * c->steps_per_unit),
+                                (int32_t)lround(c->acceleration * c->steps_per_unit), err);
+    return note(in, part, rc, err);
+}
+
+static int command(struct instrument *in, enum instrument_part part,
+                   int (*call)(struct axis *a, struct gon_error *err), struct gon_error *err)
+{
+    struct motor *m = &in->motor[part];
+    m->engaged = m->config->backlash <= 0;
+    m->commanded = NAN;
+    return note(in, part, call(m->axis, err), err);
+}
+
+int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, part, err);
+    return rc < 0 ? rc : command(in, part, in->motor[part].axis->ops->home, err);
+}
+
+int instrument_halt(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, part, err);
+    return rc < 0 ? rc : command(in, part, in->motor[part].axis->ops->stop, err);
+}
+
+// --- laser --------------------------------------------------------------------------------------------
+
+int instrument_laser(struct instrument *in, struct laser_status *ret_status, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_LASER, err);
+    if (rc >= 0)
+        rc = note(in, PART_LASER, safety_status(in->safety, &in->laser, err), err);
+    if (rc >= 0)
+        *ret_status = in->laser;
+    return rc;
+}
+
+int instrument_power(struct instrument *in, double power_w, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_LASER, err);
+    return rc < 0 ? rc : note(in, PART_LASER, safety_set_power(in->safety, power_w, err), err);
+}
+
+int instrument_emission_on(struct instrument *in, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_LASER, err);
+    return rc < 0 ? rc : note(in, PART_LASER, safety_on(in->safety, err), err);
+}
+
+int instrument_emission_off(struct instrument *in, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_LASER, err);
+    if (rc < 0)
+        return rc;
+    rc = note(in, PART_LASER, safety_off(in->safety, err), err);
+    if (rc >= 0)
+        in->laser.emission = false;
+    return rc;
+}
+
+void instrument_permit(struct instrument *in, bool running)
+{
+    if (in->safety)
+        safety_permit(in->safety, running);
+}
+
+bool instrument_emission(const struct instrument *in)
+{
+    return in->safety && safety_emission(in->safety);
+}
+
+const struct safety *instrument_safety(const struct instrument *in)
+{
+    return in->safety;
+}
+
+// --- detector -----------------------------------------------------------------------------------------
+
+int instrument_ranges(const struct instrument *in)
+{
+    return in->detector ? in->detector->ops->ranges(in->detector) : 0;
+}
+
+double instrument_full_scale_v(const struct instrument *in, int range)
+{
+    return in->detector->ops->full_scale_v(in->detector, range);
+}
+
+int instrument_range(const struct instrument *in)
+{
+    return in->range;
+}
+
+int instrument_set_range(struct instrument *in, int range, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_DETECTOR, err);
+    if (rc < 0)
+        return rc;
+    in->range = -1;
+    rc = note(in, PART_DETECTOR, in->detector->ops->set_range(in->detector, range, err), err);
+    if (rc >= 0)
+        in->range = range;
+    return rc;
+}
+
+int instrument_sample(struct instrument *in, struct detector_sample *ret_sample, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_DETECTOR, err);
+    if (rc >= 0)
+        rc = note(in, PART_DETECTOR, in->detector->ops->sample(in->detector, &in->sample, err), err);
+    if (rc >= 0)
+        *ret_sample = in->sample;
+    return rc;
+}
+
+int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_DETECTOR, err);
+    return rc < 0 ? rc
+                  : note(in, PART_DETECTOR,
+                         in->detector->ops->condition(in->detector, ret_flags, err), err);
+}
+
+double instrument_time_constant_s(const struct instrument *in)
+{
+    return in->time_constant_s;
+}

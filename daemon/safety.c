@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/safety.h"
+
+#include <stdlib.h>
+
+struct safety {
+    struct laser *laser;
+    struct clk *clk;
+    bool running;  // a run has permission
+    bool emission; // on was sent, off was not read back since
+    bool pending;  // off was sent and not read back
+    int64_t tick_ns, worst_gap_ns;
+};
+
+struct safety *safety_new(struct laser *laser, struct clk *clk)
+{
+    struct safety *s = calloc(1, sizeof *s);
+    if (!s) {
+        laser->ops->free(laser);
+        return NULL;
+    }
+    *s = (struct safety){.laser = laser, .clk = clk, .tick_ns = clk_now_ns(clk)};
+    return s;
+}
+
+void safety_free(struct safety *s)
+{
+    if (!s)
+        return;
+    safety_off(s, NULL);
+    s->laser->ops->free(s->laser);
+    free(s);
+}
+
+int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error *err)
+{
+    char text[96];
+    int rc = safety_off(s, err);
+    if (rc < 0)
+        return rc;
+    return s->laser->ops->identify(s->laser, ret_text ? ret_text : text,
+                                   ret_text ? size : sizeof text, err);
+}
+
+int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_error *err)
+{
+    int rc = s->laser->ops->reopen(s->laser, err);
+    return rc < 0 ? rc : safety_begin(s, ret_text, size, err);
+}
+
+void safety_permit(struct safety *s, bool running)
+{
+    s->running = running;
+}
+
+int safety_set_power(struct safety *s, double power_w, struct gon_error *err)
+{
+    return s->laser->ops->set_power(s->laser, power_w, err);
+}
+
+static int check_may_emit(struct safety *s, struct gon_error *err)
+{
+    struct laser_status now;
+    if (!s->running)
+        return gon_fail(err, GON_E_REFUSED, "stays off: no campaign is running");
+    if (s->pending)
+        return gon_fail(err, GON_E_REFUSED, "stays off: an earlier OFF was not confirmed");
+    int rc = safety_status(s, &now, err);
+    if (rc < 0)
+        return rc;
+    if (!now.interlock_closed || now.state == LASER_INTERLOCK)
+        return gon_fail(err, GON_E_REFUSED,
+                        "the interlock is open; close it, then: gonio resume");
+    if (now.state == LASER_NEEDS_KEY)
+        return gon_fail(err, GON_E_REFUSED,
+                        "wants its key switch turned off and on, then: gonio resume");
+    if (now.state == LASER_FAULT)
+        return gon_fail(err, GON_E_DEVICE, "fault %d (%s); clear it, then: gonio resume",
+                        now.fault_code, safety_fault_text(s, now.fault_code));
+    return 0;
+}
+
+int safety_on(struct safety *s, struct gon_error *err)
+{
+    int rc = check_may_emit(s, err);
+    if (rc < 0)
+        return rc;
+
+    // From here until an off is read back the laser counts as emitting, whatever the answer is.
+    s->emission = true;
+    s->tick_ns = clk_now_ns(s->clk);
+    rc = s->laser->ops->on(s->laser, err);
+    if (rc < 0)
+        safety_off(s, NULL);
+    return rc;
+}
+
+// A link that is gone is tried again by whoever reopens it: waiting here would only delay that.
+int safety_off(struct safety *s, struct gon_error *err)
+{
+    const int64_t until_ns = clk_now_ns(s->clk) + CLK_S(SAFETY_OFF_S);
+    struct gon_error why = {0};
+    int rc;
+    s->pending = true;
+    for (;;) {
+        rc = s->laser->ops->off(s->laser, &why);
+        if (rc >= 0) {
+            s->emission = s->pending = false;
+            return 0;
+        }
+        if (rc == GON_E_GONE || clk_now_ns(s->clk) >= until_ns)
+            break;
+        clk_sleep(s->clk, CLK_MS(100), NULL);
+    }
+    // Before the first ON there is only a link that fails; afterwards light may come out.
+    if (s->emission || rc == GON_E_DEVICE)
+        return gon_fail(err, rc, "LASER MAY BE ON: use its key or the interlock (%s)", why.text);
+    return gon_fail(err, rc, "%s", why.text);
+}
+
+void safety_tick(struct safety *s)
+{
+    const int64_t now_ns = clk_now_ns(s->clk);
+    if (s->emission && now_ns - s->tick_ns > s->worst_gap_ns)
+        s->worst_gap_ns = now_ns - s->tick_ns;
+    s->tick_ns = now_ns;
+}
+
+int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_error *err)
+{
+    return s->laser->ops->status(s->laser, ret_status, err);
+}
+
+const char *safety_fault_text(const struct safety *s, int code)
+{
+    const char *text = s->laser->ops->fault_text ? s->laser->ops->fault_text(code) : NULL;
+    return text ? text : "no text for it";
+}
+
+bool safety_emission(const struct safety *s)
+{
+    return s->emission;
+}
+
+bool safety_pending(const struct safety *s)
+{
+    return s->pending;
+}
+
+int64_t safety_worst_gap_ns(const struct safety *s)
+{
+    return s->worst_gap_ns;
+}

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: MIT
+// uses: daemon campaign drivers fit sim model base
+#include "daemon/travel.h"
+#include "tests/unit/simbench.h"
+#include "tests/unit/simconfig.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+struct setting {
+    struct simbench b;
+    struct bench_config bench;
+    struct instrument *in;
+    struct cancel *cancel;
+    int64_t cancel_at_ns;
+};
+
+static int set_up(void **state)
+{
+    struct setting *s = calloc(1, sizeof *s);
+    simbench_init(&s->b, NULL);
+    simconfig_bench(&s->bench);
+    struct instrument_parts parts = simbench_parts(&s->b);
+    s->cancel = cancel_new();
+    assert_int_equal(instrument_new(&s->bench, &parts, &s->b.clk.clk, &s->in, NULL), 0);
+    assert_int_equal(travel_home(s->in, NULL, NULL), 0);
+    *state = s;
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    struct setting *s = *state;
+    instrument_free(s->in);
+    cancel_free(s->cancel);
+    free(s);
+    return 0;
+}
+
+static double load(struct setting *s, enum world_axis axis)
+{
+    return motion_at(&s->b.world.axis[axis], s->b.clk.t_ns).load;
+}
+
+static int move(struct setting *s, double theta_i, double theta_r, double sample, struct travel_pose *ret,
+                struct gon_error *err)
+{
+    const struct travel_pose target = {{theta_i, theta_r, sample}};
+    return travel_move(s->in, &target, s->cancel, ret, err);
+}
+
+static void predicted_time_of_long_and_short_moves(void **state)
+{
+    (void)state;
+    // 20 deg/s and 60 deg/s^2: 10 deg = 0.5 s cruise + 1/3 s; 1.35 deg never reaches full speed
+    assert_float_equal(travel_time_s(10, 20, 60), 10.0 / 20 + 20.0 / 60, 1e-12);
+    assert_float_equal(travel_time_s(-1.35, 20, 60), 0.3, 1e-12);
+    assert_float_equal(travel_time_s(0, 20, 60), 0, 0);
+}
+
+static void axes_start_together_and_arrive_in_the_predicted_time(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    assert_int_equal(move(s, 5, -50, 0, &at, NULL), 0); // and takes up the play
+    const int64_t start_ns = s->b.clk.t_ns;
+    assert_int_equal(move(s, 45, 30, NAN, &at, NULL), 0);
+    const double s_taken = (double)(s->b.clk.t_ns - start_ns) * 1e-9;
+    const double slowest = travel_time_s(80, 20, 60);
+    assert_true(s_taken >= slowest && s_taken < slowest + 0.06); // one poll of 50 ms at the most
+    assert_float_equal(at.at[PART_THETA_I], 45, 1e-9);
+    assert_float_equal(at.at[PART_THETA_R], 30, 1e-9);
+    assert_float_equal(at.at[PART_SAMPLE], 0, 1e-9);
+}
+
+static void a_move_to_where_it_stands_commands_nothing(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    assert_int_equal(move(s, 10, 20, 0, &at, NULL), 0);
+    const int moves = s->b.axis[PART_THETA_I].moves + s->b.axis[PART_THETA_R].moves;
+    const int64_t start_ns = s->b.clk.t_ns;
+    assert_int_equal(move(s, 10, 20, 0, &at, NULL), 0);
+    assert_int_equal(s->b.axis[PART_THETA_I].moves + s->b.axis[PART_THETA_R].moves, moves);
+    assert_true(s->b.clk.t_ns == start_ns);
+}
+
+static void backlash_is_taken_up_from_below(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    static const double way[] = {40, 10, 9.99, 60, 59.995, -20, -19.99};
+    for (size_t i = 0; i < sizeof way / sizeof way[0]; i++) {
+        assert_int_equal(move(s, 5, way[i], 0, &at, NULL), 0);
+        // the world's load lags its motor by up to 0.015 deg after a reversal; here it must not
+        assert_float_equal(load(s, WORLD_THETA_R), way[i], 1e-9);
+    }
+}
+
+static void a_missed_position_is_sought_again_twice_and_then_reported(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    s->b.axis[PART_THETA_R].misses = 2;
+    assert_int_equal(move(s, NAN, 30, NAN, &at, &err), 0);
+    assert_float_equal(at.at[PART_THETA_R], 30, 0.003);
+    s->b.axis[PART_THETA_R].misses = 100;
+    assert_int_equal(move(s, NAN, 50, NAN, &at, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "axis theta_r"));
+    assert_non_null(strstr(err.text, "after 3 tries"));
+}
+
+static void a_lost_answer_to_a_move_is_resolved_by_reading_the_status(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    // carried out, answer lost: the move is not sent again
+    assert_int_equal(move(s, 0, 0, 0, &at, NULL), 0);
+    const int moves = s->b.axis[PART_THETA_R].moves;
+    s->b.fail_code = GON_E_LINK;
+    for (int k = 1; k < 12; k++) { // whichever call is hit; odd call numbers are carried out
+        s->b.fail_at = s->b.calls + k;
+        s->b.hit_done = false;
+        (void)move(s, NAN, s->b.axis[PART_THETA_R].moves % 2 ? 20 : 10, NAN, &at, NULL);
+    }
+    s->b.fail_at = 0;
+    // not carried out: read back, then sent again
+    const int before = s->b.axis[PART_THETA_R].moves;
+    assert_true(before > moves);
+    s->b.axis[PART_THETA_R].swallow = true;
+    assert_int_equal(move(s, NAN, 42, NAN, &at, NULL), 0);
+    assert_float_equal(at.at[PART_THETA_R], 42, 1e-9);
+}
+
+static void a_carried_out_move_with_a_lost_answer_is_sent_once(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    assert_int_equal(move(s, 0, 0, 0, &at, NULL), 0);
+    const int moves = s->b.axis[PART_THETA_R].moves;
+    s->b.fail_code = GON_E_LINK;
+    s->b.calls = 1;   // status, then the move is call 3: odd, so it is carried out
+    s->b.fail_at = 3;
+    assert_int_equal(move(s, NAN, 35, NAN, &at, NULL), 0);
+    assert_true(s->b.hit_done);
+    assert_int_equal(s->b.axis[PART_THETA_R].moves, moves + 1);
+}
+
+static void a_move_that_never_ends_is_reported_and_stopped(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    const int64_t start_ns = s->b.clk.t_ns;
+    const int stops = s->b.axis[PART_THETA_I].stops;
+    assert_int_equal(move(s, 0, 0, 0, &at, &err), 0);
+    s->b.axis[PART_THETA_R].frozen = false;
+    const struct travel_pose target = {{40, 40, NAN}};
+    s->b.axis[PART_THETA_I].misses = 0;
+    s->b.axis[PART_THETA_R].frozen = true;
+    // frozen from the start: it is told to stop first and does not
+    assert_int_equal(travel_move(s->in, &target, NULL, &at, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "axis theta_r: still moves 2 s after a stop"));
+    assert_true(s->b.axis[PART_THETA_I].stops > stops);
+    assert_true(s->b.clk.t_ns - start_ns < CLK_S(30));
+}
+
+static void freeze_theta_r(void *ctx, int64_t t_ns)
+{
+    struct setting *s = ctx;
+    (void)t_ns;
+    s->b.axis[PART_THETA_R].frozen = true;
+}
+
+static void a_deadline_ends_a_move(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    assert_int_equal(move(s, 0, 0, 0, &at, &err), 0);
+    const int64_t start_ns = s->b.clk.t_ns;
+    s->b.clk.on_advance = freeze_theta_r;
+    s->b.clk.ctx = s;
+    assert_int_equal(move(s, NAN, 20, NAN, &at, &err), GON_E_DEVICE);
+    s->b.clk.on_advance = NULL;
+    assert_non_null(strstr(err.text, "axis theta_r: still not at 20"));
+    const double s_taken = (double)(s->b.clk.t_ns - start_ns) * 1e-9;
+    assert_float_equal(s_taken, 2 * travel_time_s(20, 20, 60) + 2, 0.1);
+    assert_true(s->b.axis[PART_THETA_R].stops > 0);
+}
+
+static void an_alarm_stops_all_axes_and_is_named(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    s->b.axis[PART_THETA_I].alarm = 0x30;
+    assert_int_equal(move(s, 10, 10, 0, &at, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "axis theta_i: alarm 30h (overload)"));
+}
+
+static void a_lost_home_position_is_never_trusted(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    s->b.axis[PART_THETA_R].homed = false;
+    assert_int_equal(move(s, 10, 10, 0, &at, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "axis theta_r: lost its home position"));
+    assert_int_equal(travel_home(s->in, NULL, &err), 0);
+    assert_int_equal(move(s, 10, 10, 0, &at, &err), 0);
+}
+
+static void targets_beyond_the_travel_are_refused_before_moving(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    const int moves = s->b.axis[PART_THETA_I].moves;
+    assert_int_equal(move(s, 90, NAN, NAN, &at, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "axis theta_i: 90.0000 deg is outside its travel -5..88 deg"));
+    assert_int_equal(s->b.axis[PART_THETA_I].moves, moves);
+}
+
+static void cancel_later(void *ctx, int64_t t_ns)
+{
+    struct setting *s = ctx;
+    if (t_ns >= s->cancel_at_ns)
+        cancel_request(s->cancel);
+}
+
+static void a_cancel_stops_the_axes_within_a_slice(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    assert_int_equal(move(s, 0, 0, 0, &at, NULL), 0);
+    s->cancel_at_ns = s->b.clk.t_ns + CLK_S(0.5);
+    s->b.clk.on_advance = cancel_later;
+    s->b.clk.ctx = s;
+    assert_int_equal(move(s, 80, 150, 30, &at, NULL), GON_E_CANCELED);
+    s->b.clk.on_advance = NULL;
+    assert_true(s->b.clk.t_ns - s->cancel_at_ns <= CLK_MS(100));
+    for (int i = 0; i < INSTRUMENT_AXES; i++)
+        assert_false(motion_at(&s->b.world.axis[i], s->b.clk.t_ns + CLK_S(1)).moving);
+    assert_true(load(s, WORLD_THETA_R) < 60);
+}
+
+static void stations_by_name(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose pose;
+    struct gon_error err;
+    assert_int_equal(travel_station(s->in, "beam", &pose, &err), 0);
+    assert_float_equal(pose.at[PART_THETA_R], 180, 0);
+    assert_float_equal(pose.at[PART_SAMPLE], 30, 0);
+    assert_int_equal(travel_station(s->in, "baem", &pose, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "\"baem\""));
+}
+
+int main(void)
+{
+#define T(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+    const struct CMUnitTest tests[] = {
+        T(predicted_time_of_long_and_short_moves),
+        T(axes_start_together_and_arrive_in_the_predicted_time),
+        T(a_move_to_where_it_stands_commands_nothing),
+        T(backlash_is_taken_up_from_below),
+        T(a_missed_position_is_sought_again_twice_and_then_reported),
+        T(a_lost_answer_to_a_move_is_resolved_by_reading_the_status),
+        T(a_carried_out_move_with_a_lost_answer_is_sent_once),
+        T(a_move_that_never_ends_is_reported_and_stopped),
+        T(a_deadline_ends_a_move),
+        T(an_alarm_stops_all_axes_and_is_named),
+        T(a_lost_home_position_is_never_trusted),
+        T(targets_beyond_the_travel_are_refused_before_moving),
+        T(a_cancel_stops_the_axes_within_a_slice),
+        T(stations_by_name),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
