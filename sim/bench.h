@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// The whole simulated bench: one world, its instruments, and two ports to each of them (a serial and a
+// TCP one). Still bytes and times only: goniosim puts wires on the ports, tests feed them. Thread: one.
+#pragma once
+#include "sim/az.h"
+#include "sim/cobolt.h"
+#include "sim/modbus.h"
+#include "sim/sr830.h"
+#include "sim/world.h"
+
+enum bench_port {
+    BENCH_AXES,
+    BENCH_AXES_TCP,
+    BENCH_LASER,
+    BENCH_LASER_TCP,
+    BENCH_DETECTOR,
+    BENCH_DETECTOR_TCP,
+    BENCH_PORTS
+};
+
+extern const char *const bench_port_names[BENCH_PORTS]; // "axes", "axes-tcp", "laser", ...
+
+struct bench_spec {
+    struct world_spec world;
+    double steps_per_unit[WORLD_AXES];
+    double home_speed, home_acceleration; // deg/s, deg/s2; mm for the stage
+    double start_s;                       // from a command to the motor
+    bool homed;
+    double laser_reply_s, detector_reply_s, axes_reply_s;
+    bool laser_echo;
+};
+
+struct bench {
+    struct world world;
+    struct sim_az az[WORLD_AXES]; // units 1, 2, 3
+    struct sim_cobolt laser;
+    struct sim_sr830 detector;
+    struct sim_modbus axes_port[2]; // serial, TCP
+    struct sim_cobolt_port laser_port[2];
+    struct sim_sr830_port detector_port[2];
+};
+
+void bench_defaults(struct bench_spec *ret_spec);
+// The bench must not move in memory afterwards.
+void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns);
+struct port *bench_port(struct bench *b, enum bench_port which);
