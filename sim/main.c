@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+// goniosim: the simulated bench on real wires.
+#include "base/options.h"
+#include "sim/server.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MOST_SETS = 64 };
+
+struct arguments {
+    const char *run_dir, *config, *set;
+    long seed;
+    bool fast, with_parent, help, version;
+    char *sets[MOST_SETS];
+    int set_count;
+};
+
+static const struct option_row rows[] = {
+    {"--run-dir", OPTION_TEXT, offsetof(struct arguments, run_dir), "DIR", 0, 0, "where wires and files appear; required"},
+    {"--set", OPTION_TEXT, offsetof(struct arguments, set), "NAME=VALUE", 0, 0, "one setting of sim.cfg; may be repeated"},
+    {"--seed", OPTION_INT, offsetof(struct arguments, seed), "N", 0, 2147483647, "of everything random"},
+    {"--fast", OPTION_FLAG, offsetof(struct arguments, fast), NULL, 0, 0, "quick axes, filter and warm-up; no baud timing"},
+    {"--exit-with-parent", OPTION_FLAG, offsetof(struct arguments, with_parent), NULL, 0, 0, "end when the parent process ends"},
+    {"--help", OPTION_FLAG, offsetof(struct arguments, help), NULL, 0, 0, "this text"},
+    {"--version", OPTION_FLAG, offsetof(struct arguments, version), NULL, 0, 0, "name and version"},
+    {0}};
+
+static int fail(const struct gon_error *err)
+{
+    fprintf(stderr, "goniosim: %s\n", err->text);
+    return err->code == GON_E_INPUT ? 2 : err->code == GON_E_REFUSED ? 4 : 1;
+}
+
+// --set may come more than once, which the table of options does not know: taken out before.
+static int take_sets(int argc, char **argv, struct arguments *a, struct gon_error *err)
+{
+    int kept = 0;
+    for (int i = 0; i < argc; i++) {
+        char *value = strncmp(argv[i], "--set=", 6) == 0 ? argv[i] + 6 : NULL;
+        if (strcmp(argv[i], "--set") == 0)
+            value = i + 1 < argc ? argv[++i] : (char *)"";
+        if (!value) {
+            argv[kept++] = argv[i];
+            continue;
+        }
+        if (a->set_count == MOST_SETS || !strchr(value, '='))
+            return gon_fail(err, GON_E_INPUT, "--set %s: must be NAME=VALUE, at most %d times", value, MOST_SETS);
+        a->sets[a->set_count++] = value;
+    }
+    argv[kept] = NULL;
+    return kept;
+}
+
+static int configure(struct sim_config *c, struct arguments *a, struct gon_error *err)
+{
+    int rc = sim_config_defaults(c, err);
+    if (rc == 0 && a->fast)
+        sim_config_fast(c);
+    if (rc == 0 && a->seed >= 0)
+        c->seed = (int)a->seed;
+    for (int i = 0; i < a->set_count && rc == 0; i++) {
+        char *equals = strchr(a->sets[i], '=');
+        *equals = 0;
+        rc = sim_config_set(c, a->sets[i], equals + 1, err);
+    }
+    sim_config_finish(c);
+    return rc;
+}
+
+static int serve(struct arguments *a)
+{
+    struct gon_error err = {.text = ""};
+    struct sim_config config;
+    struct server *server;
+    int rc = configure(&config, a, &err);
+    if (rc == 0)
+        rc = server_open(&config, a->run_dir, &server, &err);
+    if (rc)
+        return fail(&err);
+    printf("goniosim %s: %s, seed %d%s\nready\n", GONIO_VERSION, a->run_dir, config.seed, a->fast ? ", fast" : "");
+    fflush(stdout);
+    rc = server_run(server, a->with_parent, &err);
+    server_close(server);
+    return rc ? fail(&err) : 0;
+}
+
+int main(int argc, char **argv)
+{
+    struct gon_error err = {.text = ""};
+    struct arguments a = {.seed = -1};
+    const char *operands[1];
+    argc = take_sets(argc, argv, &a, &err);
+    int rc = argc < 0 ? argc : options_take(argc, argv, rows, &a, operands, 0, &err);
+    if (rc < 0)
+        return fail(&err);
+    if (a.help || a.version) {
+        printf(a.help ? "goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and a control socket\n"
+                      : "goniosim " GONIO_VERSION "\n");
+        if (a.help)
+            options_describe(stdout, rows);
+        return 0;
+    }
+    if (!a.run_dir) {
+        gon_fail(&err, GON_E_INPUT, "--run-dir DIR is missing; see --help");
+        return fail(&err);
+    }
+    return serve(&a);
+}
