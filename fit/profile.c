@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include "fit/profile.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { TRIALS = 16, STEPS = 40 };
+#define CLOSE 0.01   // of the quantile: an end within 1 % of the interval's half width
+#define BETTER 1e-7  // a lower q counts as another optimum, not as rounding
+
+struct walk {
+    const struct fit_set *set;
+    const struct fit_space *space;
+    const struct covariance *cov;
+    struct fit_control *control;
+    enum fit_param which;
+    double scale;    // q to z^2
+    double quantile; // where the interval ends, in z
+    const struct fit_optimum *best;
+};
+
+static double outside(enum fit_param which, double x) // from x to the parameter
+{
+    return which == FIT_K ? sqrt(x) : which == FIT_SIGMA ? exp(x) : x;
+}
+
+static double inside(enum fit_param which, double value)
+{
+    return which == FIT_K ? value * value : which == FIT_SIGMA ? log(value) : value;
+}
+
+// Student's t for 97.5 % (Cornish and Fisher; within 1 % from 3 degrees on), the normal's for known u.
+static double quantile_of(const struct fit_set *set, double dof)
+{
+    const double z = 1.959963984540054;
+    if (set->u)
+        return z;
+    double n = fmax(dof, 2), z3 = z * z * z, z5 = z3 * z * z;
+    return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n);
+}
+
+// The others fitted with the parameter held at `value`; starts along the valley from `from`.
+static bool hold(const struct walk *w, double value, struct fit_optimum *at, double *ret_z)
+{
+    struct fit_space held = *w->space;
+    double x = inside(w->which, value), step = x - at->x[w->which];
+    double own = w->cov->inverse[w->which][w->which];
+    for (int i = 0; i < FIT_PARAMS; i++)
+        if (own > 0)
+            at->x[i] += step * w->cov->inverse[i][w->which] / own;
+    held.lower[w->which] = held.upper[w->which] = x;
+    if (!polish(w->set, &held, STEPS, w->control, at))
+        return false;
+    *ret_z = sqrt(fmax(0, (at->q - w->best->q) * w->scale));
+    return true;
+}
+
+// One end. z grows about linearly with the distance, so a secant on z, kept between what was bracketed.
+static bool find_end(const struct walk *w, double direction, double u, double *ret_end,
+                     struct fit_optimum *ret_lowest)
+{
+    double centre = outside(w->which, w->best->x[w->which]);
+    double bound = outside(w->which, direction < 0 ? w->space->lower[w->which] : w->space->upper[w->which]);
+    double room = fabs(bound - centre), inner = 0, inner_z = 0, outer = INFINITY, outer_z = INFINITY;
+    double distance = fmin(w->quantile * u, room);
+    struct fit_optimum at = *w->best;
+    *ret_end = bound;
+    if (!(room > 0) || !isfinite(w->scale))
+        return true;
+    for (int trial = 0; trial < TRIALS; trial++) {
+        double z;
+        if (!hold(w, distance < room ? centre + direction * distance : bound, &at, &z))
+            return false;
+        if (at.q < ret_lowest->q)
+            *ret_lowest = at;
+        if (fabs(z - w->quantile) <= CLOSE * w->quantile) {
+            *ret_end = centre + direction * distance;
+            return true;
+        }
+        if (z < w->quantile) {
+            if (distance >= room)
+                return true;
+            inner = distance;
+            inner_z = z;
+        } else {
+            outer = distance;
+            outer_z = z;
+        }
+        if (isinf(outer))
+            distance = fmin(room, distance * fmin(4, fmax(1.1, w->quantile / fmax(z, 1e-3))));
+        else
+            distance = inner + (outer - inner) *
+                       fmin(0.9, fmax(0.1, (w->quantile - inner_z) / (outer_z - inner_z)));
+    }
+    *ret_end = centre + direction * (inner + fmin(outer, room)) / 2;
+    return true;
+}
+
+bool profile_interval(const struct fit_set *set, const struct fit_space *space,
+                      const struct covariance *cov, enum fit_param which,
+                      struct fit_control *control, struct fit_optimum *best,
+                      struct profile *ret_profile, bool *ret_better)
+{
+    double own = cov->c[which][which], value = outside(which, best->x[which]);
+    *ret_better = false;
+    *ret_profile = (struct profile){value, value};
+    if (cov->known[which])
+        return true;
+    if (isnan(own)) {
+        *ret_profile = (struct profile){(double)NAN, (double)NAN};
+        return true;
+    }
+    struct walk w = {.set = set, .space = space, .cov = cov, .control = control, .which = which,
+                     .scale = cov->inverse[which][which] / own,
+                     .quantile = quantile_of(set, cov->dof), .best = best};
+    if (!(own > 0)) // no noise at all: the value itself
+        return true;
+    double spread = sqrt(own);
+    double u = which == FIT_K ? sqrt(best->x[which] + spread) - value
+             : which == FIT_SIGMA ? value * spread : spread;
+    struct fit_optimum lowest = *best;
+    if (!find_end(&w, -1, u, &ret_profile->lo95, &lowest) ||
+        !find_end(&w, +1, u, &ret_profile->hi95, &lowest))
+        return false;
+    if (lowest.q < best->q * (1 - BETTER)) {
+        *ret_better = true;
+        *best = lowest;
+        return polish(set, space, 5 * STEPS, control, best);
+    }
+    return true;
+}
