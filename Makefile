@@ -130,9 +130,9 @@ demo: deps
 # --- installation ---------------------------------------------------------------------------------
 MAN := $(patsubst doc/%.scd,$(B)/man/%,$(wildcard doc/*.scd))
 doc: $(MAN)
-$(B)/man/%: doc/%.scd
+$(B)/man/%: doc/%.scd scripts/man $(PROGRAMS:%=$(B)/%)
 	$(call say,MAN,$@)
-	$(Q)mkdir -p $(@D) && scdoc <$< >$@
+	$(Q)mkdir -p $(@D) && scripts/man $(B) $< >$@
 install: all doc
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/sbin $(DESTDIR)$(PREFIX)/share/gonio/configs
 	install -m755 $(B)/gonio $(B)/goniosim $(DESTDIR)$(PREFIX)/bin
