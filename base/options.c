@@ -172,3 +172,16 @@ void options_describe(FILE *out, const struct option_row *rows)
         fprintf(out, "  %-26s %s\n", left, rows->help);
     }
 }
+
+void options_manual(FILE *out, const struct option_row *rows)
+{
+    for (; rows->name; rows++) {
+        fprintf(out, "*%s*", rows->name);
+        if (rows->value)
+            fprintf(out, " _%s_", rows->value);
+        fprintf(out, "\n\t");
+        for (const char *c = rows->help; *c; c++)
+            fprintf(out, "%s%c", *c == '*' || *c == '\\' ? "\\" : "", *c);
+        fprintf(out, "\n\n");
+    }
+}

@@ -31,6 +31,8 @@ int options_take(int argc, char **argv, const struct option_row *rows, void *tar
 
 void options_describe(FILE *out, const struct option_row *rows); // one line an option, for --help
 
+void options_manual(FILE *out, const struct option_row *rows);   // the same as scdoc text, for man pages
+
 // Which of the words (NULL at their end) may have been meant by a mistyped one; NULL when none is near.
 const char *options_suggest(const char *typed, const char *const *words);
 
