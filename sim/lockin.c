@@ -59,8 +59,8 @@ void lockin_step(struct lockin *l, double signal_v, double dt_s)
 static double shown(const struct lockin *l, double v)
 {
     double most = OVER * l->full_scale_v, lsb = l->full_scale_v / 65536;
-    v = v > most ? most : v < -most ? -most : v;
-    return rint(v / lsb) * lsb;
+    v = rint(v / lsb) * lsb;
+    return v > most ? most : v < -most ? -most : v;
 }
 
 double lockin_x_v(const struct lockin *l)
