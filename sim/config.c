@@ -172,17 +172,31 @@ static int unknown(const struct cfg_row *rows, const char *path, const char *wor
                     meant ? meant : "", meant ? "'?" : "; see configs/sim.cfg");
 }
 
+#define SLOPES "6, 12, 18, 24 dB"
+
+static bool slope_exists(const struct sim_config *c)
+{
+    return c->slope_db % 6 == 0;
+}
+
 int sim_config_set(struct sim_config *c, const char *name, const char *value, struct gon_error *err)
 {
     const struct cfg_row *rows = sim_config_schema;
     const char *word = name;
+    struct sim_config whole = *c;
     for (;;) {
         size_t size = strcspn(word, ".");
         const struct cfg_row *row = find(rows, word, size);
         if (!row)
             return unknown(rows, name, word, err);
-        if (word[size] == 0)
-            return set_one(row, name, value, (char *)c, err);
+        if (word[size] == 0) {
+            int rc = set_one(row, name, value, (char *)&whole, err);
+            if (rc == 0 && !slope_exists(&whole))
+                rc = wrong(name, value, SLOPES, err);
+            if (rc == 0)
+                *c = whole;
+            return rc;
+        }
         if (!row->rows)
             return unknown(rows, name, word, err);
         rows = row->rows;
@@ -207,6 +221,22 @@ int sim_config_defaults(struct sim_config *ret_config, struct gon_error *err)
     if (rc == 0)
         *ret_config = c;
     return rc;
+}
+
+int sim_config_file(struct sim_config *c, const char *path, struct cfg_sink sink)
+{
+    struct sim_config whole = *c;
+    struct cfg_file *f = cfg_open(path, sink);
+    if (!f)
+        return GON_E_INPUT;
+    int mistakes = cfg_take(f, sim_config_schema, &whole);
+    if (mistakes == 0 && !slope_exists(&whole))
+        mistakes = cfg_complain(f, "detector.slope_db", "allowed " SLOPES);
+    cfg_close(f);
+    if (mistakes)
+        return GON_E_INPUT;
+    *c = whole;
+    return 0;
 }
 
 void sim_config_fast(struct sim_config *c)

@@ -19,6 +19,7 @@ struct arguments {
 
 static const struct option_row rows[] = {
     {"--run-dir", OPTION_TEXT, offsetof(struct arguments, run_dir), "DIR", 0, 0, "where wires and files appear; required"},
+    {"--config", OPTION_TEXT, offsetof(struct arguments, config), "FILE", 0, 0, "a sim.cfg"},
     {"--set", OPTION_TEXT, offsetof(struct arguments, set), "NAME=VALUE", 0, 0, "one setting of sim.cfg; may be repeated"},
     {"--seed", OPTION_INT, offsetof(struct arguments, seed), "N", 0, 2147483647, "of everything random"},
     {"--fast", OPTION_FLAG, offsetof(struct arguments, fast), NULL, 0, 0, "quick axes, filter and warm-up; no baud timing"},
@@ -31,6 +32,12 @@ static int fail(const struct gon_error *err)
 {
     fprintf(stderr, "goniosim: %s\n", err->text);
     return err->code == GON_E_INPUT ? 2 : err->code == GON_E_REFUSED ? 4 : 1;
+}
+
+static void say(void *ctx, const char *line)
+{
+    (void)ctx;
+    fprintf(stderr, "%s\n", line);
 }
 
 // --set may come more than once, which the table of options does not know: taken out before.
@@ -56,6 +63,8 @@ static int take_sets(int argc, char **argv, struct arguments *a, struct gon_erro
 static int configure(struct sim_config *c, struct arguments *a, struct gon_error *err)
 {
     int rc = sim_config_defaults(c, err);
+    if (rc == 0 && a->config && sim_config_file(c, a->config, (struct cfg_sink){say, NULL}))
+        rc = gon_fail(err, GON_E_INPUT, "%s is not usable; nothing was started", a->config);
     if (rc == 0 && a->fast)
         sim_config_fast(c);
     if (rc == 0 && a->seed >= 0)
