@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+#include "cli/fitview.h"
+
+#include "cli/out.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <string.h>
+
+static double number(const json_t *o, const char *key)
+{
+    const json_t *v = json_object_get(o, key);
+    return json_is_number(v) ? json_number_value(v) : (double)NAN;
+}
+
+// With two digits of the uncertainty on a terminal; all digits in a pipe.
+static void cell(struct table *t, double value, double u)
+{
+    if (!isfinite(value))
+        table_cell(t, "%s", out_is_terminal(stdout) ? "-" : "");
+    else if (!out_is_terminal(stdout))
+        table_cell(t, "%.9g", value);
+    else if (isfinite(u) && u > 0 && u < 1e4 && u > 1e-9)
+        table_cell(t, "%.*f", (int)fmax(0.0, 1.0 - floor(log10(u))), value);
+    else
+        table_cell(t, "%.5g", value);
+}
+
+static void parameter(struct table *t, const json_t *params, const char *name)
+{
+    const json_t *p = json_object_get(params, name);
+    double u = number(p, "u");
+    bool at_bound = json_is_true(json_object_get(p, "at_bound"));
+    bool identified = json_is_true(json_object_get(p, "identified"));
+    table_cell(t, "%s", name);
+    cell(t, number(p, "value"), u);
+    cell(t, u, u);
+    cell(t, number(p, "lo95"), u);
+    cell(t, number(p, "hi95"), u);
+    table_cell(t, "%s%s", at_bound ? "at its bound" : identified ? "" : "not identified",
+               at_bound && !identified ? ", not identified" : "");
+}
+
+static void derived(struct table *t, const json_t *all, const char *key, const char *name, const char *note)
+{
+    const json_t *d = json_object_get(all, key);
+    double u = number(d, "u");
+    table_cell(t, "%s", name);
+    cell(t, number(d, "value"), u);
+    cell(t, u, u);
+    table_cell(t, "%s", "");
+    table_cell(t, "%s", "");
+    table_cell(t, "%s", note);
+}
+
+static void plain(struct table *t, const char *name, double value)
+{
+    table_cell(t, "%s", name);
+    cell(t, value, NAN);
+    for (int i = 0; i < 4; i++)
+        table_cell(t, "%s", "");
+}
+
+void fitview_print(const json_t *fit)
+{
+    static const char *const names[] = {"n", "k", "sigma", "ks", "kd"};
+    const json_t *params = json_object_get(fit, "params"), *more = json_object_get(fit, "derived");
+    struct table *t = table_new(6);
+    for (const char *const *h = (const char *const[]){"parameter", "value", "u", "lo95", "hi95", "note", NULL}; *h; h++)
+        table_cell(t, "%s", *h);
+    for (int i = 1; i < 5; i++)
+        table_right(t, i);
+    for (int i = 0; i < 5; i++)
+        parameter(t, params, names[i]);
+    derived(t, more, "ks_r0", "ks*R(0)", "specular strength at normal incidence");
+    derived(t, more, "ks_r45", "ks*R(45)", "at 45 deg");
+    derived(t, more, "dhr_0", "DHR(0)", "directional-hemispherical reflectance");
+    derived(t, more, "dhr_45", "DHR(45)", "");
+    derived(t, more, "dhr_60", "DHR(60)", "");
+    plain(t, "Delta", number(fit, "delta"));
+    if (isfinite(number(fit, "chi2_per_dof")))
+        plain(t, "chi2/dof", number(fit, "chi2_per_dof"));
+    table_print(t, stdout);
+    fflush(stdout);
+
+    size_t i;
+    const json_t *warning;
+    json_array_foreach(json_object_get(fit, "warnings"), i, warning)
+        out_warn("%s", json_string_value(warning) ? json_string_value(warning) : "");
+}
+
+void fitview_line(const json_t *fit, char *text, unsigned long size)
+{
+    const json_t *params = json_object_get(fit, "params"), *more = json_object_get(fit, "derived");
+    const json_t *sigma = json_object_get(params, "sigma"), *kd = json_object_get(params, "kd");
+    const json_t *r0 = json_object_get(more, "ks_r0");
+    snprintf(text, size, "sigma %.5g ±%.1g, kd %.4g ±%.1g, ks*R(0) %.4g ±%.1g, Delta %.3g",
+             number(sigma, "value"), number(sigma, "u"), number(kd, "value"), number(kd, "u"),
+             number(r0, "value"), number(r0, "u"), number(fit, "delta"));
+}

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: MIT
+#include "cli/follow.h"
+
+#include "cli/client.h"
+#include "cli/fitview.h"
+#include "cli/out.h"
+#include "cli/verb.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+enum { BAR = 20 };
+
+struct follow {
+    int run;
+    const char *file;
+    bool json, live, line_shown, ended;
+    char state[32];
+    json_t *fit; // the last one
+};
+
+static double number(const json_t *o, const char *key)
+{
+    const json_t *v = json_object_get(o, key);
+    return json_is_number(v) ? json_number_value(v) : (double)NAN;
+}
+
+static int whole(const json_t *o, const char *key)
+{
+    return (int)json_integer_value(json_object_get(o, key));
+}
+
+static const char *text_of(const json_t *o, const char *key)
+{
+    const char *text = json_string_value(json_object_get(o, key));
+    return text ? text : "";
+}
+
+static void clear_line(struct follow *f)
+{
+    if (f->line_shown)
+        fputs("\r\033[K", stderr);
+    f->line_shown = false;
+}
+
+static void time_left(double left_s, char *text, size_t size)
+{
+    if (!isfinite(left_s))
+        *text = 0;
+    else if (left_s < 100)
+        snprintf(text, size, "%.0f s left", left_s);
+    else if (left_s < 6000)
+        snprintf(text, size, "%.0f min left", left_s / 60);
+    else
+        snprintf(text, size, "%.0f h %02.0f min left", floor(left_s / 3600), floor(fmod(left_s, 3600) / 60));
+}
+
+static void bar(double part, char *text)
+{
+    *text = 0;
+    for (int i = 0; i < BAR; i++)
+        strcat(text, i < (int)(part * BAR + 0.5) ? "█" : "░");
+}
+
+// The live line. It is short enough for 110 columns; a narrower terminal loses its end.
+static void show_reading(struct follow *f, const json_t *e)
+{
+    char filled[BAR * 4 + 1], left[40], value[60] = "", line[400];
+    double part = whole(e, "points") > 0 ? (double)whole(e, "point") / whole(e, "points") : 0;
+    double f_r = number(e, "f_r_per_sr"), u = number(e, "u_f_r_per_sr");
+    bar(part, filled);
+    time_left(number(e, "left_s"), left, sizeof left);
+    if (isfinite(f_r))
+        snprintf(value, sizeof value, "f_r %.4g ±%.1g /sr", f_r, u);
+    int n = snprintf(line, sizeof line, "sweep %d/%d θi=%g°  %s %3.0f%%  θr %7.2f°  %s   %s   laser %s",
+                     whole(e, "sweep"), whole(e, "sweeps"), number(e, "theta_i_deg"), filled, 100 * part,
+                     number(e, "theta_r_deg"), value, left,
+                     json_is_true(json_object_get(e, "emission")) ? "ON" : "off");
+    int columns = out_columns(stderr), seen = 0;
+    for (int i = 0; i < n; i++)
+        if ((line[i] & 0xc0) != 0x80 && ++seen >= columns)
+            line[n = i] = 0;
+    fprintf(stderr, "\r%s\033[K", line);
+    fflush(stderr);
+    f->line_shown = true;
+}
+
+static void show_sweep(struct follow *f, const json_t *e)
+{
+    char left[40];
+    clear_line(f);
+    time_left(number(e, "left_s"), left, sizeof left);
+    if (!f->live)
+        fprintf(stderr, "sweep %d/%d  theta_i %g deg  %d of %d readings  %s\n", whole(e, "sweep"),
+                whole(e, "sweeps"), number(e, "theta_i_deg"), whole(e, "point"), whole(e, "points"), left);
+}
+
+static void show_state(struct follow *f, const json_t *e)
+{
+    const char *state = text_of(e, "state"), *text = text_of(e, "text");
+    bool same = !strcmp(state, f->state) && !*text;
+    snprintf(f->state, sizeof f->state, "%s", state);
+    if (same)
+        return;
+    clear_line(f);
+    fprintf(stderr, "run %d %s%s%s\n", f->run, state, *text ? ": " : "", text);
+}
+
+static void take_fit(struct follow *f, const json_t *e)
+{
+    json_t *fit = json_object_get(e, "fit");
+    char text[300];
+    json_decref(f->fit);
+    f->fit = json_incref(fit);
+    clear_line(f);
+    if (!fit)
+        fprintf(stderr, "fit after sweep %d failed: %s\n", whole(e, "sweep"), text_of(e, "error"));
+    else if (!f->json) {
+        fitview_line(fit, text, sizeof text);
+        fprintf(stderr, "fit after sweep %d: %s\n", whole(e, "sweep"), text);
+    }
+}
+
+static bool is_end(const char *state)
+{
+    return !strcmp(state, "done") || !strcmp(state, "stopped") || !strcmp(state, "failed");
+}
+
+static bool take_event(void *ctx, const json_t *e)
+{
+    struct follow *f = ctx;
+    const char *kind = text_of(e, "event");
+    if (strcmp(kind, "lost") && whole(e, "run") != f->run)
+        return true;
+    if (f->json)
+        out_json_line(e);
+    if (!strcmp(kind, "fit"))
+        take_fit(f, e);
+    else if (!f->json && !strcmp(kind, "reading") && f->live)
+        show_reading(f, e);
+    else if (!f->json && !strcmp(kind, "sweep"))
+        show_sweep(f, e);
+    else if (!f->json && !strcmp(kind, "log"))
+        clear_line(f), fprintf(stderr, "%s\n", text_of(e, "text"));
+    if (strcmp(kind, "state"))
+        return true;
+    if (!f->json)
+        show_state(f, e);
+    snprintf(f->state, sizeof f->state, "%s", text_of(e, "state"));
+    f->ended = is_end(f->state);
+    return !f->ended;
+}
+
+static void trouble(void *ctx, const char *text)
+{
+    clear_line(ctx);
+    out_say("%s", text);
+}
+
+static int report_end(struct follow *f)
+{
+    bool done = !strcmp(f->state, "done");
+    if (!f->json && f->fit)
+        fitview_print(f->fit);
+    if (!f->json && *f->file)
+        fprintf(stderr, "readings: %s   (gonio show %d, gonio fit %d)\n", f->file, f->run, f->run);
+    if (!f->json && !done)
+        fprintf(stderr, "go on with: gonio resume %d\n", f->run);
+    return done && f->fit ? EXIT_OK : EXIT_FAILED;
+}
+
+// Ctrl-C arrives as a readable descriptor.
+static int interrupt_open(sigset_t *ret_before)
+{
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    sigprocmask(SIG_BLOCK, &set, ret_before);
+    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+int follow_run(struct client *c, int run, const char *file, const char *last_id, bool json)
+{
+    struct follow f = {.run = run, .file = file, .json = json, .live = !json && out_colour(stderr)};
+    struct client_follower follower = {&f, take_event, trouble};
+    struct gon_error err = {0};
+    sigset_t before;
+    int fd = interrupt_open(&before);
+    if (f.live)
+        fprintf(stderr, "(Ctrl-C: stop watching, the run continues.  Stop the run: gonio stop)\n");
+    int rc = client_follow(c, last_id, fd, &follower, &err), status;
+    clear_line(&f);
+    if (rc == GON_E_CANCELED) {
+        out_say("stopped watching; run %d goes on. Stop it: gonio stop. Watch it: gonio watch", run);
+        status = EXIT_INTERRUPTED;
+    } else if (rc < 0) {
+        status = out_fail(&err);
+    } else {
+        status = report_end(&f);
+    }
+    json_decref(f.fit);
+    if (fd >= 0)
+        close(fd);
+    sigprocmask(SIG_SETMASK, &before, NULL);
+    return status;
+}

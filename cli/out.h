@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// How the command speaks: data on stdout, talk on stderr; colour and live lines only on a terminal and
+// not with NO_COLOR; tables aligned on a terminal and tab-separated in a pipe.
+#pragma once
+#include "base/err.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+
+struct json_t; // of jansson
+
+bool out_colour(FILE *out);  // a terminal, and NO_COLOR is not set
+bool out_is_terminal(FILE *out);
+int out_columns(FILE *out);  // width of the terminal; 80 when it is not known
+
+enum out_style { OUT_PLAIN, OUT_BOLD, OUT_DIM, OUT_RED, OUT_GREEN, OUT_YELLOW };
+const char *out_begin(FILE *out, enum out_style style); // "" without colour
+const char *out_end(FILE *out);
+
+void out_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));  // "gonio: ..." on stderr
+void out_warn(const char *fmt, ...) __attribute__((format(printf, 1, 2))); // "warning: ..." on stderr
+
+// Says the error and returns the exit status that its code stands for.
+int out_fail(const struct gon_error *err);
+
+void out_json(const struct json_t *o);      // indented, with a newline, on stdout
+void out_json_line(const struct json_t *o); // one line, flushed
+
+// Writes what stdout still holds; EXIT_FAILED when it could not be written, else status.
+int out_finish(int status);
+
+// A table: cells are collected row by row and printed at the end.
+struct table;
+struct table *table_new(int columns); // never NULL: ends the program without memory
+void table_cell(struct table *t, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+void table_right(struct table *t, int column);       // aligned to the right
+void table_print(struct table *t, FILE *out);        // the first row is the heading; frees the table

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+// status, stop, pause, resume: one question to the daemon each.
+#include "cli/remote.h"
+
+#include "cli/client.h"
+#include "cli/out.h"
+#include "cli/verb.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct options {
+    struct remote_options remote;
+};
+
+static const struct option_row rows[] = {
+    REMOTE_SOCKET(struct options),
+    REMOTE_JSON(struct options),
+    VERB_OPTIONS_END,
+};
+
+json_t *remote_call(const struct remote_options *o, const char *method, const char *path, const json_t *body,
+                    int *ret_status)
+{
+    struct client *c = NULL;
+    struct gon_error err;
+    json_t *reply = NULL;
+    int rc = client_new(o->socket, &c, &err);
+    if (rc == 0)
+        rc = client_request(c, method, path, body, &reply, &err);
+    client_free(c);
+    if (rc < 0)
+        *ret_status = out_fail(&err);
+    return reply;
+}
+
+static const char *text_of(const json_t *o, const char *key)
+{
+    const char *text = json_string_value(json_object_get(o, key));
+    return text ? text : "";
+}
+
+static int whole(const json_t *o, const char *key)
+{
+    return (int)json_integer_value(json_object_get(o, key));
+}
+
+static void put_number(const json_t *o, const char *key, const char *fmt_before, int decimals, const char *unit)
+{
+    const json_t *v = json_object_get(o, key);
+    if (json_is_number(v))
+        printf("%s%.*f %s", fmt_before, decimals, json_number_value(v), unit);
+}
+
+// --- status -------------------------------------------------------------------------------------
+
+static void print_axis(const json_t *d)
+{
+    const char *unit = text_of(d, "unit");
+    put_number(d, "position", "", 3, unit);
+    if (json_is_true(json_object_get(d, "moving")))
+        put_number(d, "target", ", moving to ", 3, unit);
+    if (json_is_false(json_object_get(d, "homed")))
+        printf(", not homed");
+    if (json_is_true(json_object_get(d, "alarm")))
+        printf(", ALARM %d", whole(d, "alarm_code"));
+}
+
+static void print_laser(const json_t *d)
+{
+    printf("%s, emission %s", text_of(d, "state"), json_is_true(json_object_get(d, "emission")) ? "ON" : "off");
+    put_number(d, "power_w", ", ", 4, "W");
+    printf(", interlock %s", json_is_true(json_object_get(d, "interlock_closed")) ? "closed" : "OPEN");
+    if (json_is_true(json_object_get(d, "off_unconfirmed")))
+        printf(", LASER MAY BE ON: use the key or the interlock");
+}
+
+static void print_detector(const json_t *d)
+{
+    const json_t *v = json_object_get(d, "full_scale_v");
+    if (json_is_number(v))
+        printf("full scale %g V", json_number_value(v));
+    v = json_object_get(d, "signal_v");
+    if (json_is_number(v))
+        printf(", last %.4g V", json_number_value(v));
+    v = json_object_get(d, "time_constant_s");
+    if (json_is_number(v))
+        printf(", time constant %g s", json_number_value(v));
+}
+
+static void print_device(const json_t *d)
+{
+    const char *name = text_of(d, "name"), *link = text_of(d, "link");
+    printf("%-9s ", name);
+    if (!strcmp(link, "lost"))
+        printf("%sLOST%s: %s", out_begin(stdout, OUT_RED), out_end(stdout), text_of(d, "problem"));
+    else if (!strcmp(name, "laser"))
+        print_laser(d);
+    else if (!strcmp(name, "detector"))
+        print_detector(d);
+    else
+        print_axis(d);
+    putchar('\n');
+}
+
+static void print_run(const json_t *r)
+{
+    const char *text = text_of(r, "text");
+    printf("run %d    %s (%s)%s%s\n", whole(r, "run"), text_of(r, "state"), text_of(r, "name"), *text ? ": " : "", text);
+    printf("progress  sweep %d of %d, %d of %d readings", whole(r, "sweep"), whole(r, "sweeps"),
+           whole(r, "point"), whole(r, "points"));
+    put_number(r, "left_s", ", ", 0, "s left");
+    const json_t *f = json_object_get(r, "f_r_per_sr");
+    if (json_is_number(f)) {
+        put_number(r, "theta_i_deg", "\nreading   theta_i ", 2, "deg");
+        put_number(r, "theta_r_deg", ", theta_r ", 2, "deg");
+        printf(", f_r %.4g /sr", json_number_value(f));
+    }
+    printf("\nfile      %s\n", text_of(r, "file"));
+}
+
+static void print_status(const json_t *s)
+{
+    const json_t *run = json_object_get(s, "run"), *each;
+    size_t i;
+    printf("goniod %s, pid %d%s, campaigns in %s\n", text_of(s, "version"), whole(s, "pid"),
+           json_is_true(json_object_get(s, "simulator")) ? ", simulated bench" : "", text_of(s, "directory"));
+    if (json_is_object(run))
+        print_run(run);
+    else
+        printf("idle      start a run: gonio run FILE.cfg\n");
+    if (json_array_size(json_object_get(s, "queued")))
+        printf("waiting   %zu more\n", json_array_size(json_object_get(s, "queued")));
+    json_array_foreach(json_object_get(s, "devices"), i, each)
+        print_device(each);
+    if (*text_of(s, "last_error"))
+        printf("last error: %s\n", text_of(s, "last_error"));
+}
+
+static int run_status(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    int status = EXIT_OK;
+    if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
+        return EXIT_INPUT;
+    json_t *s = remote_call(&o.remote, "GET", "/api/v1/status", NULL, &status);
+    if (s && o.remote.json)
+        out_json(s);
+    else if (s)
+        print_status(s);
+    json_decref(s);
+    return status;
+}
+
+const struct verb verb_status = {
+    "status", "", "what the daemon is doing: run, axes, laser, detector",
+    "Shows the run that has the bench, what waits, each device, and the last error.\n", rows, run_status};
+
+// --- stop, pause, resume --------------------------------------------------------------------------
+
+static int command(const struct verb *verb, int argc, char **argv, const char *path, json_t **ret_reply)
+{
+    struct options o = {0};
+    int status = EXIT_OK;
+    if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
+        return EXIT_INPUT;
+    *ret_reply = remote_call(&o.remote, "POST", path, NULL, &status);
+    if (*ret_reply && o.remote.json)
+        out_json(*ret_reply);
+    return status;
+}
+
+static int run_stop(const struct verb *verb, int argc, char **argv)
+{
+    json_t *reply = NULL;
+    int status = command(verb, argc, argv, "/api/v1/stop", &reply), run = whole(reply, "run");
+    if (reply && run)
+        fprintf(stderr, "run %d %s: laser off, axes halted. Go on with: gonio resume %d\n", run,
+                text_of(reply, "state"), run);
+    else if (reply)
+        fprintf(stderr, "nothing was running; laser off and axes halted all the same\n");
+    json_decref(reply);
+    return status;
+}
+
+const struct verb verb_stop = {
+    "stop", "", "laser off and axes halted, at once and without asking",
+    "Ends the run that has the bench and puts back those that wait. All readings are kept; go on later\n"
+    "with gonio resume. Works in any state, and asks nothing.\n", rows, run_stop};
+
+static int run_pause(const struct verb *verb, int argc, char **argv)
+{
+    json_t *reply = NULL;
+    int status = command(verb, argc, argv, "/api/v1/pause", &reply);
+    if (reply)
+        fprintf(stderr, "run %d pauses after the reading in progress, laser off. Go on with: gonio resume\n",
+                whole(reply, "run"));
+    json_decref(reply);
+    return status;
+}
+
+const struct verb verb_pause = {
+    "pause", "", "hold the run, laser off, until gonio resume",
+    "Holds the run that has the bench after the reading in progress: laser off, axes still.\n", rows, run_pause};
+
+// The run's number when the text is one, else the file's path as the daemon will need it.
+static json_t *what_to_resume(const char *text)
+{
+    char *end, path[4096];
+    long id = strtol(text, &end, 10);
+    if (!*end && end != text)
+        return json_pack("{s:I}", "resume", (json_int_t)id);
+    return json_pack("{s:s}", "resume", realpath(text, path) ? path : text);
+}
+
+static int run_resume(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    const char *operands[1];
+    int status = EXIT_OK, count = verb_take(verb, argc, argv, &o, operands, 0, 1);
+    if (count < 0)
+        return EXIT_INPUT;
+    json_t *body = count ? what_to_resume(operands[0]) : NULL;
+    json_t *reply = remote_call(&o.remote, "POST", count ? "/api/v1/runs" : "/api/v1/resume", body, &status);
+    if (reply && o.remote.json)
+        out_json(reply);
+    if (reply)
+        fprintf(stderr, "run %d goes on. Watch it: gonio watch\n", whole(reply, "run"));
+    json_decref(reply);
+    json_decref(body);
+    return status;
+}
+
+const struct verb verb_resume = {
+    "resume", "[RUN]", "go on with a paused run, or with RUN where it was stopped",
+    "Without RUN, goes on with the run that is paused. RUN is a number that gonio list shows, or a campaign\n"
+    "file: it is queued again and goes on with its first point that has no accepted reading.\n",
+    rows, run_resume};

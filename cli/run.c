@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// run and watch: a campaign given to the daemon, and its progress until it ends.
+#include "cli/check.h"
+#include "cli/client.h"
+#include "cli/follow.h"
+#include "cli/out.h"
+#include "cli/remote.h"
+#include "cli/verb.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct options {
+    struct remote_options remote;
+    bool detach;
+};
+
+static const struct option_row run_rows[] = {
+    {"--detach", OPTION_FLAG, offsetof(struct options, detach), NULL, 0, 0, "start it and do not follow"},
+    REMOTE_SOCKET(struct options),
+    {"--json", OPTION_FLAG, offsetof(struct options, remote.json), NULL, 0, 0, "one JSON object a line"},
+    VERB_OPTIONS_END,
+};
+
+static const struct option_row watch_rows[] = {
+    REMOTE_SOCKET(struct options),
+    {"--json", OPTION_FLAG, offsetof(struct options, remote.json), NULL, 0, 0, "one JSON object a line"},
+    VERB_OPTIONS_END,
+};
+
+// Follows with its own connection, from the event that the reply names.
+static int follow(const struct remote_options *o, const json_t *run, const json_t *event_id)
+{
+    struct client *c = NULL;
+    struct gon_error err;
+    char id[32];
+    const char *file = json_string_value(json_object_get(run, "file"));
+    snprintf(id, sizeof id, "%" JSON_INTEGER_FORMAT, json_integer_value(event_id));
+    if (client_new(o->socket, &c, &err) < 0)
+        return out_fail(&err);
+    int status = follow_run(c, (int)json_integer_value(json_object_get(run, "run")), file ? file : "", id, o->json);
+    client_free(c);
+    return status;
+}
+
+static int run_run(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    const char *file;
+    char *text = NULL;
+    if (verb_take(verb, argc, argv, &o, &file, 1, 1) < 0)
+        return EXIT_INPUT;
+    int status = check_campaign(file, &text);
+    json_t *body = status ? NULL : json_pack("{s:s, s:s}", "config", text, "name", file);
+    json_t *reply = body ? remote_call(&o.remote, "POST", "/api/v1/runs", body, &status) : NULL;
+    free(text);
+    json_decref(body);
+    if (!reply)
+        return status ? status : EXIT_FAILED;
+    if (o.remote.json && o.detach)
+        out_json_line(reply);
+    else if (!o.remote.json)
+        fprintf(stderr, "run %d started%s\n", (int)json_integer_value(json_object_get(reply, "run")),
+                o.detach ? ". Watch it: gonio watch" : "");
+    if (!o.detach)
+        status = follow(&o.remote, reply, json_object_get(reply, "event_id"));
+    json_decref(reply);
+    return status;
+}
+
+const struct verb verb_run = {
+    "run", "FILE.cfg", "measure a campaign and follow it to its end",
+    "Gives the campaign to the daemon, shows its progress, and at the end the fitted parameters. Ctrl-C\n"
+    "stops watching only; the run goes on until gonio stop. Look first with: gonio plan FILE.cfg\n",
+    run_rows, run_run};
+
+static int run_watch(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    int status = EXIT_OK;
+    if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
+        return EXIT_INPUT;
+    json_t *s = remote_call(&o.remote, "GET", "/api/v1/status", NULL, &status);
+    json_t *run = json_object_get(s, "run");
+    if (json_is_object(run)) {
+        if (!o.remote.json)
+            fprintf(stderr, "run %d %s\n", (int)json_integer_value(json_object_get(run, "run")),
+                    json_string_value(json_object_get(run, "state")));
+        status = follow(&o.remote, run, json_object_get(s, "event_id"));
+    } else if (s) {
+        out_say("no run is active; start one: gonio run FILE.cfg, or see: gonio list");
+    }
+    json_decref(s);
+    return status;
+}
+
+const struct verb verb_watch = {
+    "watch", "", "follow the run that has the bench",
+    "Shows the progress of the active run until its end. Ctrl-C stops watching; the run goes on.\n",
+    watch_rows, run_watch};

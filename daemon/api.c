@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/api.h"
+
+#include "daemon/hub.h"
+#include "daemon/view.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct call {
+    struct hub *hub;
+    const struct http_request *request;
+    uint64_t ticket;
+    const char *rest; // of the path after the resource's name
+};
+
+int api_status(int gon_code)
+{
+    switch (gon_code) {
+    case GON_E_INPUT: return 400;
+    case GON_E_REFUSED: return 409;
+    case GON_E_GONE: return 404;
+    default: return 500;
+    }
+}
+
+static const char *what_to_do(int gon_code)
+{
+    switch (gon_code) {
+    case GON_E_INPUT: return "mend it and try again";
+    case GON_E_STORE: return "look at the disk of the campaign directory";
+    default: return "see: gonio status";
+    }
+}
+
+static struct http_reply reply(int status, char *body)
+{
+    return (struct http_reply){status, body, NULL};
+}
+
+static struct http_reply fail(int status, const char *error, const char *where, const char *next)
+{
+    return reply(status, http_error(error, where, next));
+}
+
+// "bad.cfg:4" of "bad.cfg:4: campaign...": cut off when there is one.
+static char *cut_where(char **text)
+{
+    char *colon = strchr(*text, ':');
+    size_t digits = colon ? strspn(colon + 1, "0123456789") : 0;
+    if (!digits || strncmp(colon + 1 + digits, ": ", 2))
+        return NULL;
+    char *where = *text;
+    colon[1 + digits] = 0;
+    *text = colon + 1 + digits + 2;
+    return where;
+}
+
+// Our sentences are "what; what to do".
+char *api_error(int gon_code, const char *text)
+{
+    char copy[2000], *what = copy;
+    snprintf(copy, sizeof copy, "%s", text);
+    char *where = cut_where(&what), *next = strrchr(what, ';');
+    if (next && next[1] == ' ' && !strchr(what, '\n'))
+        *next = 0;
+    else
+        next = NULL;
+    return http_error(what, where, next ? next + 2 : what_to_do(gon_code));
+}
+
+static struct http_reply failed(const struct gon_error *err)
+{
+    return reply(api_status(err->code), api_error(err->code, err->text));
+}
+
+// --- reading ------------------------------------------------------------------------------------
+
+static struct http_reply get_status(const struct call *c)
+{
+    struct hub_status s;
+    hub_status(c->hub, &s);
+    const struct queue *q = hub_queue(c->hub);
+    const struct run *active = queue_active(q), *run;
+    json_t *queued = json_array();
+    for (size_t i = 0; (run = queue_at(q, i)); i++)
+        if (run != active && run->state == RUN_QUEUED)
+            json_array_append_new(queued, json_integer(run->id));
+    json_t *o = json_pack("{s:s, s:i, s:b, s:I, s:f, s:s, s:I, s:s, s:o}", "version", GONIO_VERSION, "pid",
+                          (int)getpid(), "simulator", s.simulator, "seed", (json_int_t)s.seed, "uptime_s",
+                          s.uptime_s, "directory", s.directory, "event_id", (json_int_t)s.event_id,
+                          "last_error", s.last_error, "queued", queued);
+    json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
+    json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
+    return reply(200, view_text(o));
+}
+
+static struct http_reply get_runs(const struct call *c)
+{
+    const struct run *run;
+    json_t *all = json_array();
+    for (size_t i = 0; (run = queue_at(hub_queue(c->hub), i)); i++)
+        json_array_append_new(all, view_run(run, false));
+    return reply(200, view_text(json_pack("{s:o}", "runs", all)));
+}
+
+static struct http_reply get_run(const struct call *c)
+{
+    char *end;
+    long id = strtol(c->rest, &end, 10);
+    const struct run *run = *end || end == c->rest || id > 2147483647 ? NULL : queue_run(hub_queue(c->hub), (int)id);
+    if (!run)
+        return fail(404, "there is no such run", c->request->path, "see: gonio list");
+    return reply(200, view_text(view_run(run, true)));
+}
+
+static struct http_reply get_events(const struct call *c)
+{
+    (void)c;
+    return (struct http_reply){HTTP_STREAM, NULL, NULL};
+}
+
+// --- commands -----------------------------------------------------------------------------------
+
+static struct http_reply resume_run(const struct call *c, const json_t *what)
+{
+    struct gon_error err;
+    if (json_is_string(what)) {
+        hub_submit_path(c->hub, json_string_value(what), c->ticket);
+        return reply(HTTP_LATER, NULL);
+    }
+    json_int_t id = json_integer_value(what);
+    if (!json_is_integer(what) || id < 1 || id > 2147483647)
+        return fail(400, "\"resume\" is neither a run's number nor a path", NULL, "see: gonio list");
+    if (hub_submit(c->hub, (int)id, &err) < 0)
+        return failed(&err);
+    return reply(201, hub_submitted(c->hub, (int)id));
+}
+
+static struct http_reply create_run(const struct call *c, json_t *body)
+{
+    json_error_t e;
+    const char *config, *name = "campaign.cfg";
+    if (json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s}", "config", &config, "name", &name) < 0)
+        return fail(400, e.text, "the request's body", "send {\"config\": text, \"name\": path} or {\"resume\": run}");
+    hub_create(c->hub, config, name, c->ticket);
+    return reply(HTTP_LATER, NULL);
+}
+
+static struct http_reply post_runs(const struct call *c)
+{
+    json_error_t e;
+    char where[80];
+    json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
+    if (!body) {
+        snprintf(where, sizeof where, "the request's body, line %d column %d", e.line, e.column);
+        return fail(400, e.text, where, "send one JSON object");
+    }
+    const json_t *what = json_object_get(body, "resume");
+    struct http_reply r = what && json_object_size(body) == 1 ? resume_run(c, what) : create_run(c, body);
+    json_decref(body);
+    return r;
+}
+
+static struct http_reply post_stop(const struct call *c)
+{
+    char why[100];
+    snprintf(why, sizeof why, "stopped by uid %ld, pid %ld", c->request->uid, c->request->pid);
+    hub_stop(c->hub, why, c->ticket);
+    return reply(HTTP_LATER, NULL);
+}
+
+static struct http_reply told(const struct call *c, int run, const struct gon_error *err)
+{
+    if (run < 0)
+        return failed(err);
+    return reply(202, view_text(view_run(queue_run(hub_queue(c->hub), run), false)));
+}
+
+static struct http_reply post_pause(const struct call *c)
+{
+    struct gon_error err;
+    int run = hub_pause(c->hub, &err);
+    return told(c, run, &err);
+}
+
+static struct http_reply post_resume(const struct call *c)
+{
+    struct gon_error err;
+    int run = hub_resume(c->hub, &err);
+    return told(c, run, &err);
+}
+
+// --- routes -------------------------------------------------------------------------------------
+
+static const struct route {
+    const char *method, *path; // a path that ends with '/' has a rest
+    struct http_reply (*handle)(const struct call *c);
+    const char *allow; // all methods of that path
+} routes[] = {
+    {"GET", "/api/v1/status", get_status, "GET"},     {"GET", "/api/v1/runs", get_runs, "GET, POST"},
+    {"POST", "/api/v1/runs", post_runs, "GET, POST"}, {"GET", "/api/v1/runs/", get_run, "GET"},
+    {"GET", "/api/v1/events", get_events, "GET"},     {"POST", "/api/v1/stop", post_stop, "POST"},
+    {"POST", "/api/v1/pause", post_pause, "POST"},    {"POST", "/api/v1/resume", post_resume, "POST"},
+};
+
+static const char *rest_of(const struct route *r, const char *path)
+{
+    size_t n = strlen(r->path);
+    bool prefix = r->path[n - 1] == '/';
+    if (prefix ? strncmp(path, r->path, n) : strcmp(path, r->path))
+        return NULL;
+    return path + n;
+}
+
+struct http_reply api_request(void *hub, const struct http_request *request, uint64_t ticket)
+{
+    const struct route *same_path = NULL;
+    for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {
+        struct call c = {hub, request, ticket, rest_of(&routes[i], request->path)};
+        if (!c.rest)
+            continue;
+        if (!strcmp(routes[i].method, request->method))
+            return routes[i].handle(&c);
+        same_path = &routes[i];
+    }
+    if (!same_path)
+        return fail(404, "there is no such resource", request->path, "see /api/v1/status, /api/v1/runs, /api/v1/events");
+    struct http_reply r = fail(405, "that method is not for this resource", request->path, same_path->allow);
+    r.allow = same_path->allow;
+    return r;
+}

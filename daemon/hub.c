@@ -1,0 +1,443 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/hub.h"
+
+#include "base/cancel.h"
+#include "base/clk.h"
+#include "base/log.h"
+#include "daemon/api.h"
+#include "daemon/fitter.h"
+#include "daemon/loop.h"
+#include "daemon/material.h"
+#include "daemon/note.h"
+#include "daemon/runner.h"
+#include "daemon/storer.h"
+#include "daemon/view.h"
+
+#include <assert.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_EVENTS = 4096, MOST_EVENT_BYTES = 4 * 1024 * 1024, MOST_STOPS = 32 };
+
+struct hub {
+    struct hub_options options;
+    struct loop *loop;
+    struct mail *box, *store_box, *run_box, *fit_box; // of each thread
+    struct cancel *cancel;
+    struct events *events;
+    struct http *http;
+    struct queue *queue;
+    struct storer *storer;
+    struct runner *runner;
+    struct fitter *fitter;
+    struct instrument_snapshot *snapshot; // NULL: none yet
+    char last_error[480];
+    int64_t start_ns;
+    uint64_t stops[MOST_STOPS]; // tickets that wait for the end of a stop
+    int stop_count;
+    bool ready_said, listed, ending, ended_said;
+};
+
+// --- what is told to those who watch --------------------------------------------------------------
+
+static void publish(struct hub *h, const char *kind, json_t *data)
+{
+    char *text = view_text(data);
+    if (text)
+        events_add(h->events, kind, text);
+    free(text);
+    if (h->http)
+        http_wake(h->http);
+}
+
+static void answer_stops(struct hub *h, int status, const char *body)
+{
+    for (int i = 0; i < h->stop_count; i++)
+        http_answer(h->http, h->stops[i], status, strdup(body));
+    h->stop_count = 0;
+}
+
+static void changed(void *ctx, const struct run *run)
+{
+    struct hub *h = ctx;
+    bool bad = run->state == RUN_FAILED || run->state == RUN_PAUSED;
+    log_say(h->options.log, bad ? LOG_WARN : LOG_NOTICE, "run", "%d %s%s%s", run->id, run_state_name(run->state),
+            *run->text ? ": " : "", run->text);
+    if (bad)
+        snprintf(h->last_error, sizeof h->last_error, "%s", run->text);
+    publish(h, "state", view_run(run, false));
+    if (queue_idle(h->queue) && h->stop_count) {
+        char *body = view_text(view_run(run, false));
+        answer_stops(h, 200, body ? body : "{}");
+        free(body);
+    }
+}
+
+static void happened(struct hub *h, const struct note *n)
+{
+    static const char *const kinds[] = {"state", "reading", "sweep", "log"};
+    const struct run *run = queue_run(h->queue, n->run);
+    queue_engine_event(h->queue, n->run, &n->event);
+    if (!run || n->event.kind == ENGINE_STATE)
+        return;
+    json_t *o = view_run(run, false);
+    if (n->event.kind == ENGINE_LOG) {
+        json_object_set_new(o, "text", json_string(n->text ? n->text : ""));
+        log_say(h->options.log, LOG_NOTICE, "run", "%d: %s", n->run, n->text ? n->text : "");
+    } else if (n->event.kind == ENGINE_READING) {
+        log_say(h->options.log, LOG_INFO, "reading", "run %d point %d/%d theta_i %g theta_r %g deg f_r %.5g /sr",
+                n->run, run->point, run->points, run->theta_i_deg, run->theta_r_deg, run->f_per_sr);
+    } else {
+        log_say(h->options.log, LOG_NOTICE, "run", "%d: sweep %d of %d", n->run, run->sweep, run->sweeps);
+    }
+    publish(h, kinds[n->event.kind], o);
+}
+
+static void fitted(struct hub *h, const struct note *n)
+{
+    json_t *fit = n->text ? json_loads(n->text, 0, NULL) : NULL;
+    bool canceled = !fit && n->err.code == GON_E_CANCELED;
+    json_t *o = json_pack("{s:i, s:i, s:b}", "run", n->run, "sweep", n->sweep, "last", n->last);
+    if (fit)
+        json_object_set_new(o, "fit", fit);
+    else
+        json_object_set_new(o, "error", json_string(n->err.text));
+    if (!fit && !canceled)
+        log_say(h->options.log, LOG_WARN, "fit", "run %d after sweep %d: %s", n->run, n->sweep, n->err.text);
+    publish(h, "fit", o);
+    queue_fitted(h->queue, n->run, fit ? n->text : NULL, &n->err);
+}
+
+// --- what the queue asks for ----------------------------------------------------------------------
+
+static struct note *about(enum note_kind kind, const struct run *run)
+{
+    struct note *n = note_new(kind);
+    n->run = run->id;
+    n->name = note_text(run->path);
+    return n;
+}
+
+static void open_port(void *ctx, const struct run *run)
+{
+    struct hub *h = ctx;
+    note_post(h->store_box, about(NOTE_OPEN, run));
+}
+
+static void start_port(void *ctx, const struct run *run, void *material)
+{
+    struct hub *h = ctx;
+    struct note *n = about(NOTE_START, run);
+    n->thing = material;
+    n->drop = run_material_free;
+    note_post(h->run_box, n);
+}
+
+static void fit_port(void *ctx, const struct run *run, int sweep, bool last)
+{
+    struct hub *h = ctx;
+    struct note *n = about(NOTE_FIT_WANTED, run);
+    n->sweep = sweep;
+    n->last = last;
+    note_post(h->fit_box, n);
+}
+
+static void close_port(void *ctx, const struct run *run, enum run_state as)
+{
+    struct hub *h = ctx;
+    struct note *n = about(NOTE_CLOSE, run);
+    n->state = as;
+    n->text = note_text(run->text);
+    note_post(h->store_box, n);
+}
+
+static void cancel_port(void *ctx)
+{
+    struct hub *h = ctx;
+    cancel_request(h->cancel);
+}
+
+static void rearm_port(void *ctx)
+{
+    struct hub *h = ctx;
+    if (!h->ending)
+        cancel_reset(h->cancel); // no worker is at work: none can miss it
+}
+
+// --- requests -------------------------------------------------------------------------------------
+
+char *hub_submitted(const struct hub *h, int run)
+{
+    const struct run *r = queue_run(h->queue, run);
+    json_t *o = view_run(r, false);
+    json_object_set_new(o, "event_id", json_integer((json_int_t)events_last_id(h->events)));
+    return view_text(o);
+}
+
+void hub_status(const struct hub *h, struct hub_status *ret_status)
+{
+    *ret_status = (struct hub_status){
+        .directory = h->options.directory,
+        .last_error = h->last_error,
+        .simulator = h->options.simulator,
+        .seed = h->options.seed,
+        .uptime_s = (double)(clk_now_ns(clk_system()) - h->start_ns) / 1e9,
+        .event_id = events_last_id(h->events),
+        .snapshot = h->snapshot,
+    };
+}
+
+const struct queue *hub_queue(const struct hub *h)
+{
+    return h->queue;
+}
+
+void hub_create(struct hub *h, const char *config, const char *name, uint64_t ticket)
+{
+    struct note *n = note_new(NOTE_CREATE);
+    n->ticket = ticket;
+    n->text = note_text(config);
+    n->name = note_text(name);
+    note_post(h->store_box, n);
+}
+
+void hub_submit_path(struct hub *h, const char *path, uint64_t ticket)
+{
+    struct note *n = note_new(NOTE_LOOK);
+    n->ticket = ticket;
+    n->name = note_text(path);
+    note_post(h->store_box, n);
+}
+
+int hub_submit(struct hub *h, int run, struct gon_error *err)
+{
+    const struct run *active = queue_active(h->queue);
+    if (active && active->id == run && active->state == RUN_PAUSED) {
+        int rc = hub_resume(h, err);
+        return rc < 0 ? rc : GON_OK;
+    }
+    return queue_submit(h->queue, run, err);
+}
+
+void hub_stop(struct hub *h, const char *why, uint64_t ticket)
+{
+    if (h->stop_count == MOST_STOPS)
+        http_answer(h->http, ticket, 503, http_error("a stop is under way", NULL, "see: gonio status"));
+    else
+        h->stops[h->stop_count++] = ticket;
+    bool any = queue_stop(h->queue, why);
+    if (any && queue_idle(h->queue))
+        answer_stops(h, 200, "{\"run\":null,\"state\":\"idle\"}"); // only waiting runs were put back
+    else if (!any)
+        note_post(h->run_box, note_new(NOTE_HALT));
+}
+
+static int to_active(struct hub *h, enum note_kind kind, bool paused, struct gon_error *err)
+{
+    const struct run *run = queue_active(h->queue);
+    if (!run)
+        return gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
+    bool right = paused ? run->state == RUN_PAUSED : run->state == RUN_RUNNING || run->state == RUN_PREPARING;
+    if (!right)
+        return gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id, run_state_name(run->state));
+    note_post(h->run_box, note_new(kind));
+    return run->id;
+}
+
+int hub_pause(struct hub *h, struct gon_error *err)
+{
+    return to_active(h, NOTE_PAUSE, false, err);
+}
+
+int hub_resume(struct hub *h, struct gon_error *err)
+{
+    return to_active(h, NOTE_RESUME, true, err);
+}
+
+// --- what the workers say -------------------------------------------------------------------------
+
+static void known(struct hub *h, struct note *n)
+{
+    struct gon_error err = n->err;
+    struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
+    int rc = run ? hub_submit(h, run->id, &err) : (int)err.code;
+    if (rc == 0) {
+        http_answer(h->http, n->ticket, 201, hub_submitted(h, run->id));
+    } else {
+        if (rc == GON_E_STORE)
+            snprintf(h->last_error, sizeof h->last_error, "%s", err.text);
+        http_answer(h->http, n->ticket, api_status(rc), api_error(rc, n->text ? n->text : err.text));
+    }
+}
+
+static void halted(struct hub *h, const struct note *n)
+{
+    if (n->err.code) {
+        snprintf(h->last_error, sizeof h->last_error, "%s", n->err.text);
+        char *body = api_error(n->err.code, n->err.text);
+        answer_stops(h, 500, body);
+        free(body);
+    } else {
+        answer_stops(h, 200, "{\"run\":null,\"state\":\"idle\"}");
+    }
+}
+
+static void take_snapshot(struct hub *h, struct note *n)
+{
+    free(h->snapshot);
+    h->snapshot = note_steal(n);
+}
+
+static void engine_ended(struct hub *h, const struct note *n)
+{
+    if (n->run)
+        queue_ended(h->queue, n->run, n->state, n->err.code ? &n->err : NULL);
+    else if (h->options.ended && !h->ended_said) { // the bench could not even be opened
+        h->ended_said = true;
+        h->options.ended(h->options.ctx, &n->err);
+    }
+}
+
+static void take(struct hub *h, struct note *n)
+{
+    switch ((enum note_kind)n->letter.kind) {
+    case NOTE_LISTED:
+        if (n->thing)
+            queue_know(h->queue, n->thing);
+        else
+            h->listed = true;
+        if (n->err.code)
+            log_say(h->options.log, LOG_WARN, "store", "%s", n->err.text);
+        break;
+    case NOTE_KNOWN: known(h, n); break;
+    case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
+    case NOTE_FITTED: fitted(h, n); break;
+    case NOTE_CLOSED: queue_closed(h->queue, n->run, n->err.code ? &n->err : NULL); break;
+    case NOTE_HAPPENED: happened(h, n); break;
+    case NOTE_FIT_ASKED: queue_fit_asked(h->queue, n->run, n->sweep, n->last); break;
+    case NOTE_ENDED: engine_ended(h, n); break;
+    case NOTE_SNAPSHOT: take_snapshot(h, n); break;
+    case NOTE_HALTED: halted(h, n); break;
+    default: break;
+    }
+}
+
+static void say_when_ready(struct hub *h)
+{
+    if (!h->ready_said && h->listed && h->snapshot) {
+        h->ready_said = true;
+        h->options.ready(h->options.ctx, h->snapshot);
+    }
+}
+
+static void say_when_ended(struct hub *h)
+{
+    if (h->ending && !h->ended_said && queue_idle(h->queue)) {
+        h->ended_said = true;
+        h->options.ended(h->options.ctx, NULL);
+    }
+}
+
+static void mail_arrived(void *ctx)
+{
+    struct hub *h = ctx;
+    for (struct note *n; (n = note_take(h->box));) {
+        take(h, n);
+        note_free(n);
+    }
+    say_when_ready(h);
+    say_when_ended(h);
+}
+
+// --- beginning and end ----------------------------------------------------------------------------
+
+static int start_workers(struct hub *h, struct gon_error *err)
+{
+    struct storer_links s = {h->options.bench,      h->options.bench_text, h->options.directory,
+                             h->store_box, h->box, h->run_box};
+    struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
+    struct runner_links r = {h->options.bench, h->cancel, h->run_box, h->box, h->store_box};
+    int rc = storer_start(&s, &h->storer, err);
+    rc = rc < 0 ? rc : fitter_start(&f, &h->fitter, err);
+    return rc < 0 ? rc : runner_start(&r, &h->runner, err);
+}
+
+static int build(struct hub *h, int listen_fd, struct gon_error *err)
+{
+    struct queue_ports q = {h, open_port, start_port, fit_port, close_port, cancel_port, rearm_port, changed};
+    struct http_ports p = {h, api_request};
+    // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be late.
+    uint64_t first_id = (uint64_t)(clk_utc_ns(clk_system()) / 1000000000) * 1000;
+    h->box = mail_new();
+    h->store_box = mail_new();
+    h->run_box = mail_new();
+    h->fit_box = mail_new();
+    h->cancel = cancel_new();
+    h->events = events_new(MOST_EVENTS, MOST_EVENT_BYTES, first_id);
+    h->queue = queue_new(&q);
+    if (!h->box || !h->store_box || !h->run_box || !h->fit_box || !h->cancel || !h->events || !h->queue)
+        return gon_fail(err, GON_E_SYSTEM, "daemon: out of memory or descriptors");
+    int rc = loop_add(h->loop, mail_fd(h->box), mail_arrived, h, err);
+    rc = rc < 0 ? rc : start_workers(h, err);
+    if (rc < 0)
+        return rc;
+    h->http = http_new(h->loop, listen_fd, h->events, &p, h->options.log, err);
+    return h->http ? GON_OK : GON_E_SYSTEM;
+}
+
+int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options, struct hub **ret_hub,
+            struct gon_error *err)
+{
+    struct hub *h = calloc(1, sizeof *h);
+    if (!h)
+        return gon_fail(err, GON_E_SYSTEM, "daemon: out of memory");
+    h->options = *options;
+    h->loop = loop;
+    h->start_ns = clk_now_ns(clk_system());
+    int rc = build(h, listen_fd, err);
+    if (rc < 0) {
+        hub_free(h);
+        return rc;
+    }
+    note_post(h->store_box, note_new(NOTE_LIST));
+    *ret_hub = h;
+    return GON_OK;
+}
+
+void hub_end(struct hub *h)
+{
+    if (h->ending)
+        return;
+    h->ending = true;
+    queue_end(h->queue);
+    say_when_ended(h);
+}
+
+// The instrument thread goes first: it is the one that switches off. The store outlives those who write.
+void hub_free(struct hub *h)
+{
+    if (!h)
+        return;
+    if (h->cancel)
+        cancel_request(h->cancel);
+    if (h->runner)
+        note_post(h->run_box, note_new(NOTE_QUIT));
+    if (h->fitter)
+        note_post(h->fit_box, note_new(NOTE_QUIT));
+    runner_join(h->runner);
+    fitter_join(h->fitter);
+    if (h->storer)
+        note_post(h->store_box, note_new(NOTE_QUIT));
+    storer_join(h->storer);
+    http_free(h->http);
+    queue_free(h->queue);
+    events_free(h->events);
+    if (h->box)
+        loop_remove(h->loop, mail_fd(h->box));
+    struct mail *const boxes[] = {h->box, h->store_box, h->run_box, h->fit_box};
+    for (int i = 0; i < 4; i++)
+        mail_free(boxes[i], note_drop);
+    cancel_free(h->cancel);
+    free(h->snapshot);
+    free(h);
+}

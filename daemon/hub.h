@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// The middle of the daemon: on the main thread it passes messages between the queue, the workers and HTTP.
+// It touches no device and no file itself.
+#pragma once
+#include "base/err.h"
+#include "daemon/events.h"
+#include "daemon/http.h"
+#include "daemon/instrument.h"
+#include "daemon/queue.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct bench_config;
+struct hub;
+struct log;
+struct loop;
+
+struct hub_options {
+    const struct bench_config *bench; // borrowed for the hub's life
+    const char *bench_text, *bench_name; // as read, for the campaign files
+    const char *directory;               // of the campaign files
+    bool simulator;
+    long seed;
+    struct log *log;
+    void (*ready)(void *ctx, const struct instrument_snapshot *s); // once, when the bench was looked at
+    void (*ended)(void *ctx, const struct gon_error *err);         // workers are idle; err: why it could not go on
+    void *ctx;
+};
+
+int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options, struct hub **ret_hub,
+            struct gon_error *err);
+void hub_end(struct hub *h);  // laser off, axes stopped, everything committed; then ended is called
+void hub_free(struct hub *h); // joins the workers; NULL is fine
+
+// For api.c: what a request asks for. A ticket is answered later through HTTP.
+struct hub_status {
+    const char *directory, *last_error;
+    bool simulator;
+    long seed;
+    double uptime_s;
+    uint64_t event_id;
+    const struct instrument_snapshot *snapshot; // NULL: none yet
+};
+void hub_status(const struct hub *h, struct hub_status *ret_status);
+const struct queue *hub_queue(const struct hub *h);
+void hub_create(struct hub *h, const char *config, const char *name, uint64_t ticket);
+// The run that is paused goes on; any other one is queued. GON_E_REFUSED, GON_E_INPUT.
+int hub_submit(struct hub *h, int run, struct gon_error *err);
+void hub_submit_path(struct hub *h, const char *path, uint64_t ticket);
+void hub_stop(struct hub *h, const char *why, uint64_t ticket);
+int hub_pause(struct hub *h, struct gon_error *err);  // the run that has the bench: its id
+int hub_resume(struct hub *h, struct gon_error *err); // the paused run: its id
+
+// The answer to a request that queued a run: status 201.
+char *hub_submitted(const struct hub *h, int run);

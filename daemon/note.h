@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// What the daemon's threads tell each other: one kind of message with a few fields, of which each kind uses
+// those named beside it. A note belongs to whoever holds it.
+#pragma once
+#include "base/err.h"
+#include "base/mail.h"
+#include "daemon/engine.h"
+#include "daemon/instrument.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum note_kind {
+    NOTE_QUIT, // to every worker: end
+    // to the store thread
+    NOTE_LIST,    // which campaigns are there
+    NOTE_CREATE,  // ticket, text: config, name: of its file: make a campaign file
+    NOTE_LOOK,    // ticket, name: path: what is this campaign
+    NOTE_OPEN,    // run, name: path: for writing
+    NOTE_READING, // sequence, thing: struct store_reading
+    NOTE_EVENT,   // sequence (0: nobody waits), level, source, text
+    NOTE_FIT,     // run, sweep, last, thing: struct fit_outcome
+    NOTE_CLOSE,   // run, state
+    // to the instrument thread
+    NOTE_START,   // run, thing: struct run_material
+    NOTE_STORED,  // sequence, err
+    NOTE_PAUSE, NOTE_RESUME,
+    NOTE_HALT,    // while no run: laser off, axes stopped
+    // to the fit thread
+    NOTE_FIT_WANTED, // run, sweep, last, name: path
+    // to the main thread
+    NOTE_LISTED,   // thing: struct run (one a note); NULL: that was all; err
+    NOTE_KNOWN,    // ticket, thing: struct run; NULL: err, and text: all complaints
+    NOTE_OPENED,   // run, thing: struct run_material; NULL: err
+    NOTE_FITTED,   // run, sweep, last, text: JSON; NULL: err
+    NOTE_CLOSED,   // run, err
+    NOTE_HAPPENED, // run, event, text
+    NOTE_FIT_ASKED, // run, sweep, last
+    NOTE_ENDED,    // run, state, err
+    NOTE_SNAPSHOT, // thing: struct instrument_snapshot
+    NOTE_HALTED    // err
+};
+
+struct note {
+    struct letter letter; // kind: note_kind
+    int run, sweep;
+    bool last;
+    uint64_t ticket, sequence;
+    enum run_state state;
+    struct gon_error err; // code 0: none
+    struct engine_event event; // its text is the note's
+    const char *level, *source; // static texts
+    char *text, *name;
+    void *thing;
+    void (*drop)(void *thing); // how to free the thing; NULL: free
+};
+
+struct note *note_new(enum note_kind kind); // ends the program without memory: nothing can be told then
+void note_free(struct note *n);             // NULL is fine
+void note_drop(struct letter *l);           // the same, for mail_free
+void note_post(struct mail *to, struct note *n);
+struct note *note_take(struct mail *m);     // NULL: none
+struct note *note_wait(struct mail *m, int timeout_ms); // -1: for ever
+char *note_text(const char *text);          // a copy; NULL of NULL
+void *note_steal(struct note *n);           // the thing, now the caller's

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/runner.h"
+
+#include "base/cancel.h"
+#include "base/clk.h"
+#include "base/log.h"
+#include "campaign/store.h"
+#include "daemon/engine.h"
+#include "daemon/instrument.h"
+#include "daemon/material.h"
+#include "daemon/note.h"
+#include "daemon/travel.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SLICE_MS = 50, IDLE_MS = 1000 };
+#define SNAPSHOT_NS CLK_S(0.5)
+#define STORE_PATIENCE_NS CLK_S(10)
+
+struct runner {
+    struct runner_links links;
+    pthread_t thread;
+    struct instrument *in;
+    int run;                // in progress; 0: none
+    uint64_t sequence;      // of the last note that the store must acknowledge
+    uint64_t acknowledged;  // the newest acknowledged
+    struct gon_error answer; // to that one
+    bool reading_open;      // the last reading was posted and not yet acknowledged
+    struct store_reading reading;
+    bool pause, resume, halt, quit;
+    struct note *start;     // the next run, held until the thread is idle
+    int64_t next_snapshot_ns;
+};
+
+// --- what the others say --------------------------------------------------------------------------
+
+static void take(struct runner *r, struct note *n)
+{
+    switch ((enum note_kind)n->letter.kind) {
+    case NOTE_QUIT: r->quit = true; break;
+    case NOTE_PAUSE: r->pause = true; break;
+    case NOTE_RESUME: r->resume = true; break;
+    case NOTE_HALT: r->halt = true; break;
+    case NOTE_STORED:
+        r->acknowledged = n->sequence;
+        r->answer = n->err;
+        break;
+    case NOTE_START:
+        r->start = n;
+        return;
+    default: break;
+    }
+    note_free(n);
+}
+
+static void take_all(struct runner *r)
+{
+    for (struct note *n; (n = note_take(r->links.box));)
+        take(r, n);
+}
+
+static void send_snapshot(struct runner *r)
+{
+    struct note *n = note_new(NOTE_SNAPSHOT);
+    struct instrument_snapshot *s = calloc(1, sizeof *s);
+    if (s)
+        instrument_snapshot(r->in, s);
+    n->thing = s;
+    note_post(r->links.to_main, n);
+}
+
+// Between the slices of every wait.
+static void watch(void *ctx)
+{
+    struct runner *r = ctx;
+    int64_t now_ns = clk_now_ns(clk_system());
+    take_all(r);
+    if (now_ns < r->next_snapshot_ns)
+        return;
+    r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
+    send_snapshot(r);
+}
+
+// --- the engine's ports ---------------------------------------------------------------------------
+
+static bool same_reading(const struct store_reading *a, const struct store_reading *b)
+{
+    return a->sweep == b->sweep && a->point == b->point && a->attempt == b->attempt;
+}
+
+static int wait_stored(struct runner *r, struct gon_error *err)
+{
+    int64_t end_ns = clk_now_ns(clk_system()) + STORE_PATIENCE_NS;
+    while (r->acknowledged != r->sequence) {
+        struct note *n = note_wait(r->links.box, SLICE_MS);
+        if (n)
+            take(r, n);
+        instrument_breathe(r->in);
+        if (clk_now_ns(clk_system()) > end_ns)
+            return gon_fail(err, GON_E_STORE, "store: no acknowledgement for 10 s; is the disk full, slow or gone?");
+    }
+    if (r->answer.code && err)
+        *err = r->answer;
+    return r->answer.code;
+}
+
+// A row that was not acknowledged in time is offered again by the engine: then its answer is waited for
+// once more, and only a refused one is sent again.
+static int store_reading_port(void *ctx, const struct store_reading *reading, struct gon_error *err)
+{
+    struct runner *r = ctx;
+    if (!r->reading_open || !same_reading(reading, &r->reading)) {
+        struct note *n = note_new(NOTE_READING);
+        struct store_reading *row = malloc(sizeof *row);
+        if (!row) {
+            note_free(n);
+            return gon_fail(err, GON_E_STORE, "store: out of memory");
+        }
+        *row = r->reading = *reading;
+        n->run = r->run;
+        n->thing = row;
+        n->sequence = ++r->sequence;
+        r->reading_open = true;
+        note_post(r->links.to_store, n);
+    }
+    int rc = wait_stored(r, err);
+    if (r->acknowledged == r->sequence)
+        r->reading_open = false;
+    return rc;
+}
+
+// Events are committed in order with the readings; nobody waits for them.
+static int store_event_port(void *ctx, const char *level, const char *source, const char *text,
+                            struct gon_error *err)
+{
+    struct runner *r = ctx;
+    struct note *n = note_new(NOTE_EVENT);
+    (void)err;
+    n->run = r->run;
+    n->level = level;
+    n->source = source;
+    n->text = note_text(text);
+    note_post(r->links.to_store, n);
+    return GON_OK;
+}
+
+static void publish_port(void *ctx, const struct engine_event *event)
+{
+    struct runner *r = ctx;
+    struct note *n = note_new(NOTE_HAPPENED);
+    n->run = r->run;
+    n->event = *event;
+    n->text = note_text(event->text);
+    n->event.text = n->text;
+    note_post(r->links.to_main, n);
+}
+
+static void request_fit_port(void *ctx, int sweep, bool last)
+{
+    struct runner *r = ctx;
+    struct note *n = note_new(NOTE_FIT_ASKED);
+    n->run = r->run;
+    n->sweep = sweep;
+    n->last = last;
+    note_post(r->links.to_main, n);
+}
+
+static bool take_flag(struct runner *r, bool *flag)
+{
+    take_all(r);
+    bool was = *flag;
+    *flag = false;
+    return was;
+}
+
+static bool take_resume_port(void *ctx)
+{
+    struct runner *r = ctx;
+    return take_flag(r, &r->resume);
+}
+
+static bool take_pause_port(void *ctx)
+{
+    struct runner *r = ctx;
+    return take_flag(r, &r->pause);
+}
+
+// --- the thread -----------------------------------------------------------------------------------
+
+static void run(struct runner *r)
+{
+    struct note *start = r->start, *n = note_new(NOTE_ENDED);
+    struct run_material *m = start->thing;
+    r->start = NULL;
+    r->run = start->run;
+    r->pause = r->resume = r->reading_open = false;
+    struct engine_ports ports = {
+        .ctx = r,
+        .clk = clk_system(),
+        .cancel = r->links.cancel,
+        .opening = m->has_opening ? &m->opening : NULL,
+        .store_reading = store_reading_port,
+        .store_event = store_event_port,
+        .publish = publish_port,
+        .request_fit = request_fit_port,
+        .take_resume = take_resume_port,
+        .take_pause = take_pause_port,
+    };
+    n->run = r->run;
+    n->state = engine_run(&ports, r->in, &m->config, &m->plan, &n->err);
+    r->run = 0;
+    send_snapshot(r);
+    note_post(r->links.to_main, n);
+    note_free(start);
+}
+
+static void halt(struct runner *r)
+{
+    struct note *n = note_new(NOTE_HALTED);
+    struct gon_error axes = {0};
+    int rc = instrument_emission_off(r->in, &n->err);
+    if (travel_stop(r->in, &axes) < 0 && rc == 0)
+        n->err = axes;
+    r->halt = false;
+    note_post(r->links.to_main, n);
+}
+
+static void idle(struct runner *r)
+{
+    int64_t tend_ns = 0;
+    while (!r->quit) {
+        int64_t now_ns = clk_now_ns(clk_system());
+        if (r->start) {
+            run(r);
+        } else if (r->halt) {
+            halt(r);
+        } else if (now_ns >= tend_ns) {
+            instrument_tend(r->in);
+            send_snapshot(r);
+            tend_ns = now_ns + CLK_MS(IDLE_MS);
+        } else {
+            struct note *n = note_wait(r->links.box, (int)((tend_ns - now_ns) / 1000000) + 1);
+            if (n)
+                take(r, n);
+        }
+    }
+}
+
+static void *thread_main(void *ctx)
+{
+    struct runner *r = ctx;
+    struct note *failed = note_new(NOTE_ENDED);
+    int rc = instrument_open(r->links.bench, clk_system(), &r->in, &failed->err);
+    if (rc < 0) {
+        note_post(r->links.to_main, failed); // run 0: the bench itself
+        return NULL;
+    }
+    note_free(failed);
+    instrument_watch(r->in, watch, r);
+    idle(r);
+    note_free(r->start);
+    instrument_free(r->in); // laser off, axes stopped
+    return NULL;
+}
+
+int runner_start(const struct runner_links *links, struct runner **ret_runner, struct gon_error *err)
+{
+    struct runner *r = calloc(1, sizeof *r);
+    if (!r)
+        return gon_fail(err, GON_E_SYSTEM, "instrument thread: out of memory");
+    r->links = *links;
+    int failed = pthread_create(&r->thread, NULL, thread_main, r);
+    if (failed) {
+        free(r);
+        return gon_fail(err, GON_E_SYSTEM, "instrument thread: %s", strerror(failed));
+    }
+    *ret_runner = r;
+    return GON_OK;
+}
+
+void runner_join(struct runner *r)
+{
+    if (!r)
+        return;
+    pthread_join(r->thread, NULL);
+    free(r);
+}

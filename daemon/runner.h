@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// The instrument thread: it alone owns the bench. It runs queued campaigns (engine_run); while it has none
+// it asks each device once a second how it is and brings back those that were lost. It tells the main
+// thread what happens and waits for the store's acknowledgements, keeping the laser's lease meanwhile.
+#pragma once
+#include "base/err.h"
+
+struct bench_config;
+struct cancel;
+struct mail;
+struct runner;
+
+// All borrowed for the thread's life; bench is not changed by anybody.
+struct runner_links {
+    const struct bench_config *bench;
+    const struct cancel *cancel; // ends a run
+    struct mail *box;            // the thread's own
+    struct mail *to_main, *to_store;
+};
+
+int runner_start(const struct runner_links *links, struct runner **ret_runner, struct gon_error *err);
+void runner_join(struct runner *r); // after NOTE_QUIT; NULL is fine

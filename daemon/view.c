@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/view.h"
+
+#include "campaign/store.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+json_t *view_number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+json_t *view_run(const struct run *run, bool with_fit)
+{
+    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id, "name",
+                          run->name, "sample", run->sample, "file", run->path, "state",
+                          run_state_name(run->state), "text", run->text, "sweep", run->sweep, "sweeps",
+                          run->sweeps, "point", run->point, "points", run->points, "emission", run->emission);
+    json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
+    json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
+    json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));
+    json_object_set_new(o, "u_f_r_per_sr", view_number(run->u_per_sr));
+    json_object_set_new(o, "flags", view_flags(run->flags));
+    json_object_set_new(o, "left_s", view_number(run->left_s));
+    if (with_fit) {
+        json_t *fit = run->fit ? json_loads(run->fit, 0, NULL) : NULL;
+        json_object_set_new(o, "fit", fit ? fit : json_null());
+    }
+    return o;
+}
+
+static void add_axis(json_t *o, const struct instrument_snapshot *s, int part)
+{
+    json_object_set_new(o, "unit", json_string(s->axis[part].unit));
+    json_object_set_new(o, "position", view_number(s->axis[part].position));
+    json_object_set_new(o, "target", view_number(s->axis[part].target));
+    json_object_set_new(o, "moving", json_boolean(s->axis[part].moving));
+    json_object_set_new(o, "homed", json_boolean(s->axis[part].homed));
+    json_object_set_new(o, "alarm", json_boolean(s->axis[part].alarm));
+    json_object_set_new(o, "alarm_code", json_integer(s->axis[part].alarm_code));
+}
+
+static void add_laser(json_t *o, const struct instrument_snapshot *s)
+{
+    json_object_set_new(o, "state", json_string(laser_state_name(s->laser.state)));
+    json_object_set_new(o, "emission", json_boolean(s->emission));
+    json_object_set_new(o, "emission_reported", json_boolean(s->laser.emission));
+    json_object_set_new(o, "off_unconfirmed", json_boolean(s->off_unconfirmed));
+    json_object_set_new(o, "interlock_closed", json_boolean(s->laser.interlock_closed));
+    json_object_set_new(o, "power_w", view_number(s->laser.power_w));
+    json_object_set_new(o, "setpoint_w", view_number(s->laser.setpoint_w));
+    json_object_set_new(o, "fault_code", json_integer(s->laser.fault_code));
+}
+
+static void add_detector(json_t *o, const struct instrument_snapshot *s)
+{
+    json_object_set_new(o, "range", json_integer(s->range));
+    json_object_set_new(o, "full_scale_v", view_number(s->full_scale_v));
+    json_object_set_new(o, "signal_v", view_number(s->signal_v));
+    json_object_set_new(o, "monitor_v", view_number(s->monitor_v));
+    json_object_set_new(o, "time_constant_s", view_number(s->time_constant_s));
+}
+
+json_t *view_devices(const struct instrument_snapshot *s)
+{
+    json_t *all = json_array();
+    for (int i = 0; i < PART_COUNT; i++) {
+        const struct part_state *p = &s->part[i];
+        if (p->link == PART_ABSENT)
+            continue;
+        json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name, "link",
+                              p->link == PART_OK ? "ok" : "lost", "address", p->address, "identity", p->identity,
+                              "problem", p->problem, "errors", (json_int_t)p->errors, "returns",
+                              (json_int_t)p->returns);
+        if (i < INSTRUMENT_AXES)
+            add_axis(o, s, i);
+        else if (i == PART_LASER)
+            add_laser(o, s);
+        else
+            add_detector(o, s);
+        json_array_append_new(all, o);
+    }
+    return all;
+}
+
+char *view_text(json_t *o)
+{
+    char *text = o ? json_dumps(o, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
+    json_decref(o);
+    return text ? text : strdup("{}");
+}

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: MIT
+"""Helpers of the system tests: programs started with bounded waits on what they say, HTTP over the Unix
+socket, the event stream, and goniosim's control socket. Every process is ended by its own id."""
+import http.client
+import json
+import os
+import pathlib
+import queue
+import signal
+import socket
+import subprocess
+import threading
+import time
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ.get("GONIO_BUILD", ROOT / "build")).resolve()
+PATIENCE_S = 20.0  # for anything that should be there within a second; generous for a loaded machine
+
+SMALL = """\
+campaign: {
+  name = "small";
+  theta_i_deg = [ 0.0, 20.0, 40.0 ];
+  theta_r: { from_deg = -60.0; to_deg = 60.0; step_deg = 5.0; };
+  dense: { half_width_deg = 3.0; step_deg = 1.0; };
+  readings: { count = 2; };
+};
+"""
+
+
+class Program:
+    """A program whose standard output is read line by line; standard error goes to a file."""
+
+    def __init__(self, argv, log, env=None):
+        self.log = pathlib.Path(log)
+        self.argv = [str(a) for a in argv]
+        with open(self.log, "ab") as err:
+            self.process = subprocess.Popen(self.argv, stdout=subprocess.PIPE, stderr=err, text=True,
+                                            env={**os.environ, **(env or {})})
+        self.pid = self.process.pid
+        self.lines = queue.Queue()
+        self.said = []
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.put(line.rstrip("\n"))
+        self.lines.put(None)
+
+    def wait_line(self, begins, patience_s=PATIENCE_S):
+        """The first line that begins so; fails with everything that was said instead."""
+        end = time.monotonic() + patience_s
+        while True:
+            try:
+                line = self.lines.get(timeout=max(0.0, end - time.monotonic()))
+            except queue.Empty:
+                line = None
+            if line is None:
+                raise AssertionError(f"{self.argv}: no line '{begins}'; said {self.said}, "
+                                     f"errors: {self.errors()}")
+            self.said.append(line)
+            if line.startswith(begins):
+                return line
+
+    def errors(self):
+        return self.log.read_text(errors="replace")
+
+    def end(self, sig=signal.SIGTERM, patience_s=10.0):
+        """Sends the signal and returns the exit status; kills what does not end in time."""
+        if self.process.poll() is None:
+            self.process.send_signal(sig)
+        try:
+            return self.process.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise AssertionError(f"{self.argv} did not end within {patience_s} s after signal {sig}; "
+                                 f"errors: {self.errors()}") from None
+
+
+class UnixConnection(http.client.HTTPConnection):
+    def __init__(self, path, timeout=PATIENCE_S):
+        super().__init__("goniod", timeout=timeout)
+        self.path = str(path)
+
+    def connect(self):
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self.path)
+
+
+class Stream:
+    """Server-sent events as dicts, from the daemon's socket."""
+
+    def __init__(self, path, last_id=None):
+        self.connection = UnixConnection(path)
+        headers = {} if last_id is None else {"Last-Event-ID": str(last_id)}
+        self.connection.request("GET", "/api/v1/events", headers=headers)
+        self.response = self.connection.getresponse()
+        self.seen = []
+
+    def next(self):
+        data = None
+        while True:
+            line = self.response.readline().decode()
+            if not line:
+                raise AssertionError(f"the event stream ended; seen {self.seen[-5:]}")
+            if line.startswith("data: "):
+                data = json.loads(line[6:])
+            elif line == "\n" and data is not None:
+                self.seen.append(data)
+                return data
+
+    def until(self, wanted, patience_s=PATIENCE_S):
+        """The first event for which wanted(event) is true."""
+        end = time.monotonic() + patience_s
+        while time.monotonic() < end:
+            event = self.next()
+            if wanted(event):
+                return event
+        raise AssertionError(f"not within {patience_s} s; last events {self.seen[-5:]}")
+
+    def until_state(self, run, *states, patience_s=60.0):
+        return self.until(lambda e: e["event"] == "state" and e["run"] == run and e["state"] in states,
+                          patience_s)
+
+    def close(self):
+        self.connection.close()
+
+
+class Sim(Program):
+    """goniosim in its own run directory."""
+
+    def __init__(self, folder, *args):
+        self.folder = pathlib.Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        super().__init__([BUILD / "goniosim", "--run-dir", self.folder, *args], f"{self.folder}.log")
+        self.wait_line("ready")
+
+    def control(self, **command):
+        return control(self.folder / "control.sock", **command)
+
+
+def control(path, **command):
+    """One question to goniosim's control socket: control(path, do="unplug", wire="laser")."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as s:
+        s.settimeout(PATIENCE_S)
+        s.connect(str(path))
+        s.sendall(json.dumps(command).encode() + b"\n")
+        with s.makefile() as answers:
+            return json.loads(answers.readline())
+
+
+class Daemon(Program):
+    """goniod with its socket and campaigns in a folder; bench: arguments that name it."""
+
+    def __init__(self, folder, *bench, env=None, ready=True):
+        self.folder = pathlib.Path(folder)
+        self.directory = self.folder / "campaigns"
+        self.socket = self.folder / "goniod.sock"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.directory.mkdir(exist_ok=True)
+        runtime = self.folder / "runtime"  # --sim makes its run directory here
+        runtime.mkdir(exist_ok=True)
+        self.env = {"GONIO_SOCKET": str(self.socket), "GONIO_DIR": str(self.directory),
+                    "XDG_RUNTIME_DIR": str(runtime), **(env or {})}
+        super().__init__([BUILD / "goniod", *(bench or ("--sim", "--fast"))], self.folder / "goniod.log",
+                         self.env)
+        if ready:
+            self.wait_line("ready")
+
+    def gonio(self, *args, **kwargs):
+        return gonio(*args, env=self.env, **kwargs)
+
+    def request(self, method, path, body=None, headers=None):
+        """Status and JSON of one request; body: text, bytes, or what becomes JSON."""
+        if body is not None and not isinstance(body, (str, bytes)):
+            body = json.dumps(body)
+        c = UnixConnection(self.socket)
+        try:
+            c.request(method, path, body=body, headers=headers or {})
+            r = c.getresponse()
+            return r.status, json.loads(r.read() or b"null")
+        finally:
+            c.close()
+
+    def submit(self, config=SMALL, name="small.cfg"):
+        """Queues a campaign; the reply with 'run', 'file' and 'event_id'."""
+        status, reply = self.request("POST", "/api/v1/runs", {"config": config, "name": name})
+        assert status == 201, reply
+        return reply
+
+    def status(self):
+        status, reply = self.request("GET", "/api/v1/status")
+        assert status == 200, reply
+        return reply
+
+    def follow(self, last_id=None):
+        return Stream(self.socket, last_id)
+
+    def sim_folder(self):
+        """The run directory of the simulator that --sim started."""
+        (folder,) = (self.folder / "runtime").glob("goniosim-*")
+        return folder
+
+    def sim_control(self, **command):
+        return control(self.sim_folder() / "control.sock", **command)
+
+
+def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None):
+    """Runs the command to its end: a CompletedProcess with text."""
+    return subprocess.run([str(BUILD / "gonio"), *map(str, args)], capture_output=True, text=True,
+                          timeout=patience_s, cwd=cwd, input=stdin, check=False,
+                          env={**os.environ, "NO_COLOR": "", **(env or {})})
+
+
+@pytest.fixture
+def start_daemon(tmp_path):
+    """Starts daemons and ends them, whatever happens to the test."""
+    daemons = []
+
+    def start(*bench, folder=None, **kwargs):
+        d = Daemon(folder or tmp_path, *bench, **kwargs)
+        daemons.append(d)
+        return d
+
+    yield start
+    for d in daemons:
+        d.end()
+
+
+@pytest.fixture
+def start_sim(tmp_path):
+    sims = []
+
+    def start(*args, folder=None):
+        s = Sim(folder or tmp_path / "bench", *args)
+        sims.append(s)
+        return s
+
+    yield start
+    for s in sims:
+        s.end()
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory):
+    """One goniod --sim --fast for all tests of a module that leave it idle."""
+    d = Daemon(tmp_path_factory.mktemp("d"), "--sim", "--fast", "--seed", "7")
+    yield d
+    assert d.end() == 0, d.errors()
