@@ -121,7 +121,7 @@ static int take_reals(const struct place *at, const config_setting_t *s, const s
         return wrong(at, s, "an empty list; give at least one number");
     for (int i = 0; i < count; i++) {
         const struct place element = inner(at, NULL, i, NULL);
-        double value = NAN;
+        double value = (double)NAN;
         mistakes += take_number(list ? &element : at,
                                 list ? config_setting_get_elem(s, (unsigned)i) : s, row, &value);
         if (values)
