@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// The plan: every point of a campaign in the order of measurement. Computed from the configuration alone,
+// and from the bench where there is one; moves nothing. Thread: any.
+//
+//   sweep 0            dark (laser off), then the beam
+//   sweep 1..sweeps    one theta_i each, in the file's order; theta_r from low to high, so that the axis
+//                      always comes from the same side; coarse grid and dense zone merged, a direction
+//                      that both ask for is measured once
+//   sweep sweeps + 1   the beam again, then dark (laser off)
+#pragma once
+#include "base/err.h"
+#include "campaign/bench.h"
+#include "campaign/config.h"
+
+#include <stdbool.h>
+
+enum plan_kind { PLAN_SAMPLE, PLAN_BEAM, PLAN_DARK };
+enum plan_skip_reason { PLAN_SKIP_BLIND, PLAN_SKIP_LIMITS };
+enum { PLAN_MOST_POINTS = 1000000 };
+
+struct plan_point {
+    int sweep, point;         // identify the point; point counts from 0 within its sweep
+    enum plan_kind kind;
+    char station[BENCH_NAME]; // "" on the sample
+    double theta_i_deg;       // nominal, multiples of 1e-6; of a station with a bench, else 0
+    double theta_r_deg;       // signed: positive forward
+    double weight;            // g of eq. 17
+    bool dense;               // within the dense zone
+    bool done;                // has an accepted reading; false in a new plan
+    int attempts;             // readings there are, accepted or not; the last attempt's number
+};
+
+struct plan_skip {
+    int sweep;
+    double theta_i_deg, theta_r_deg;
+    enum plan_skip_reason reason;
+};
+
+struct plan {
+    struct plan_point *points;
+    int count;   // all points: samples and references
+    int samples; // of them on the sample
+    int sweeps;  // with a sample point; sweep numbers 1..sweeps
+    struct plan_skip *skips;
+    int skips_count;
+    char (*warnings)[240]; // one sentence each
+    int warnings_count;
+    double duration_s; // estimate; NAN without a bench
+};
+
+// bench may be NULL. GON_E_INPUT: more than PLAN_MOST_POINTS, or nothing is left to measure.
+int plan_make(const struct campaign_config *config, const struct bench_config *bench, struct plan *ret_plan,
+              struct gon_error *err);
+void plan_clear(struct plan *p); // frees what it holds, not p; NULL is fine
+
+const char *plan_kind_name(enum plan_kind k);          // "sample", "beam", "dark"
+const char *plan_skip_text(enum plan_skip_reason r);   // "in the detector's shadow", "beyond an axis's limits"
+
+// What a reading costs the detector (daemon/acquire.h says why): until the step response of n equal poles
+// is within 1e-4, and between samples that are nearly independent.
+double plan_settle_s(double time_constant_s, int slope_db);
+double plan_spacing_s(double time_constant_s, int slope_db);

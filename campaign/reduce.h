@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// From volts to absolute BRDF with its uncertainty (metrology: GUM, type A and B kept apart).
+//
+//   underfilled  f = [(S - Ds)/(M - Dm)] / [(S0 - Ds0)/(M0 - Dm0)] / (Omega cos theta_r)
+//   overfilled   the same over (Omega cos theta_i), the beam reading being that of the field of view
+//
+// S signal, M monitor (1 without one), D dark with the laser off, 0 the beam; Omega = pi r^2/d^2. Opening
+// and closing beam and dark are averaged; half their difference is part of their uncertainty. Angles are
+// those of the encoders.
+//
+// u_A, uncorrelated from point to point: noise of signal and monitor, and of the dark. With four samples a
+// point the scatter of one point says little (its sd is uncertain by 40 %), and weights from it would
+// favour points that happened to scatter little. So one model for all,
+//   variance of a sample = floor^2 + (rel S)^2,
+// is fitted to all accepted readings' sample variances by maximum likelihood (they follow a gamma
+// distribution with (count - 1)/2 degrees of shape). Likewise rel_monitor.
+// u_B, common to all points as one factor: beam, 2u(r)/r, 2u(d)/d, linearity.
+// Thread: any.
+#pragma once
+#include "base/err.h"
+#include "campaign/bench.h"
+#include "campaign/plan.h"
+#include "campaign/store.h"
+
+struct reduced_point {
+    int sweep, point, attempt;
+    double theta_i_deg, theta_r_deg; // from the encoders; theta_r signed
+    double f_per_sr;
+    double u_a_per_sr; // NAN when no reading had two samples or none scattered
+    double u_b_per_sr;
+    double weight;     // of the plan
+};
+
+struct reduce_noise {
+    double floor_v, rel; // of one sample; NAN: unknown
+    double rel_monitor;  // of one sample; 0 without monitor
+};
+
+struct reduce_reference { // means of the accepted readings; NAN where there is none
+    double dark_signal_v, dark_monitor_v;
+    double beam_signal_v, beam_monitor_v;
+};
+
+struct reduction {
+    struct reduced_point *points; // in the plan's order
+    int count;
+    int left_out;  // points on the sample that were measured and could not be reduced (cosine, monitor)
+    int beams, darks; // how many readings the references are means of
+    double omega_sr;
+    struct reduce_reference reference;
+    double u_dark_v; // of the dark signal's mean
+    struct reduce_noise noise;
+    double u_beam_rel, u_radius_rel, u_distance_rel, u_linearity_rel;
+    double u_scale_rel; // all of them
+    int regime;         // enum bench_regime
+    int polarisation;   // of the laser, enum polarisation
+};
+
+// Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark or no beam reading yet, or a beam that is
+// not above the dark.
+int reduce_run(const struct bench_config *bench, const struct plan *plan, const struct store_reading *rows,
+               int count, struct reduction *ret_reduction, struct gon_error *err);
+int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err);
+void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL is fine
+
+// Means of the opening references (sweep 0), for provisional values after a resume.
+struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows, int count);
+
+// The noise model alone.
+struct reduce_noise reduce_noise_of(const struct plan *plan, const struct store_reading *rows, int count);
