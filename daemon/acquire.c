@@ -8,7 +8,9 @@
 
 #define SATURATED 0.95    // of full scale
 #define HEADROOM 2.0      // of a range chosen for a known signal
+#define STEPS 30000.0     // a full scale has at least so many steps: what is below one is not known
 #define SAMPLE_TRIES 3    // for one answer that is not a number
+#define FALL_MOST 1e-5    // of a signal, that is waited out
 #define CORRELATION 0.05  // of neighbouring samples
 
 // Correlation of white noise behind n equal poles, x time constants apart.
@@ -54,17 +56,17 @@ static int change_range(struct instrument *in, struct acquire *a, struct gon_err
     return rc;
 }
 
+static int64_t settled_ns(struct instrument *in, int64_t since_ns, double residual)
+{
+    const int slope_db = instrument_bench(in)->detector.slope_db;
+    return since_ns + CLK_S(detector_settle_s(instrument_time_constant_s(in), slope_db, residual));
+}
+
 static int settle(struct instrument *in, const struct acquire *a, int64_t since_ns,
                   const struct cancel *cancel, struct gon_error *err)
 {
-    const int slope_db = instrument_bench(in)->detector.slope_db;
-    const double tc_s = instrument_time_constant_s(in);
-    const double full_v = instrument_full_scale_v(in, a->range);
-    const double fall = a->last_signal_v > full_v ? full_v / a->last_signal_v : 1.0;
-    const int64_t light_ns =
-        since_ns + CLK_S(detector_settle_s(tc_s, slope_db, ACQUIRE_RESIDUAL * fall));
-    const int64_t range_ns =
-        a->range_ns + CLK_S(detector_settle_s(tc_s, slope_db, ACQUIRE_RESIDUAL));
+    const int64_t light_ns = settled_ns(in, since_ns, ACQUIRE_RESIDUAL);
+    const int64_t range_ns = settled_ns(in, a->range_ns, ACQUIRE_RESIDUAL);
     if (instrument_wait(in, light_ns > range_ns ? light_ns : range_ns, cancel) < 0)
         return gon_fail(err, GON_E_CANCELED, "stopped while settling");
     return 0;
@@ -104,6 +106,23 @@ static double sd(const struct tally *t)
     return t->n > 1 ? sqrt(t->squares / (t->n - 1)) : 0.0;
 }
 
+// The first sample tells how far the signal fell: what is left of the old one has to be small against it.
+static int first_sample(struct instrument *in, const struct acquire *a, int64_t since_ns,
+                        const struct cancel *cancel, struct detector_sample *ret_sample,
+                        struct gon_error *err)
+{
+    int rc = sample(in, ret_sample, err);
+    if (rc < 0)
+        return rc;
+    const double fall = fmax(fabs(ret_sample->signal_v) / a->last_signal_v, FALL_MOST);
+    const int64_t until_ns = settled_ns(in, since_ns, ACQUIRE_RESIDUAL * fall);
+    if (!(fall < 1.0) || until_ns <= instrument_now_ns(in))
+        return 0;
+    if (instrument_wait(in, until_ns, cancel) < 0)
+        return gon_fail(err, GON_E_CANCELED, "stopped while settling");
+    return sample(in, ret_sample, err);
+}
+
 // Saturated samples end it: more of them say nothing more.
 static int take_samples(struct instrument *in, const struct acquire *a, const struct acquire_wish *wish,
                         const struct cancel *cancel, struct acquire_reading *r, struct gon_error *err)
@@ -112,23 +131,23 @@ static int take_samples(struct instrument *in, const struct acquire *a, const st
     const int64_t spacing_ns = CLK_S(acquire_spacing_s(instrument_time_constant_s(in),
                                                        instrument_bench(in)->detector.slope_db));
     struct tally signal = {0}, monitor = {0};
-    int64_t next_ns = instrument_now_ns(in);
-    r->utc_ns = instrument_utc_ns(in);
-    for (int k = 0; k < wish->count && !(r->flags & STORE_SATURATED); k++, next_ns += spacing_ns) {
+    int64_t next_ns = 0;
+    for (int k = 0; k < wish->count && !(r->flags & STORE_SATURATED); k++) {
         struct detector_sample s;
         if (instrument_wait(in, next_ns, cancel) < 0)
             return gon_fail(err, GON_E_CANCELED, "stopped while reading");
-        int rc = sample(in, &s, err);
+        int rc = k ? sample(in, &s, err) : first_sample(in, a, wish->since_ns, cancel, &s, err);
         if (rc < 0)
             return rc;
+        if (k == 0)
+            r->utc_ns = instrument_utc_ns(in);
+        next_ns = instrument_now_ns(in) + spacing_ns;
         add(&signal, s.signal_v);
         add(&monitor, s.monitor_v);
         if (fabs(s.signal_v) >= SATURATED * full_v)
             r->flags |= STORE_SATURATED;
         if (s.monitor_v < wish->monitor_least_v)
             r->flags |= STORE_MONITOR_LOW;
-        if (next_ns < instrument_now_ns(in)) // never closer than the spacing, also after a slow answer
-            next_ns = instrument_now_ns(in);
     }
     r->count = signal.n;
     r->signal_v = signal.mean;
@@ -140,7 +159,8 @@ static int take_samples(struct instrument *in, const struct acquire *a, const st
 
 static int fitting_range(struct instrument *in, const struct acquire *a, const struct acquire_reading *r)
 {
-    const double need_v = HEADROOM * (fabs(r->signal_v) + 3.0 * r->signal_sd_v);
+    const double step_v = instrument_full_scale_v(in, r->range) / STEPS;
+    const double need_v = HEADROOM * (fabs(r->signal_v) + 3.0 * r->signal_sd_v + step_v);
     int range = a->least_range;
     while (range < r->range && instrument_full_scale_v(in, range) < need_v)
         range++;

@@ -2,9 +2,9 @@
 // One attempt at one reading: wait until the filter has settled, take samples that are nearly
 // independent, say what was wrong with them. Thread: instrument.
 //
-// Settling: the residual of a step through n RC poles (detector_settle_s) of ACQUIRE_RESIDUAL of the
-// signal before; coming down from a larger signal, of that much less, so that what is left of the old
-// signal stays ACQUIRE_RESIDUAL of the new full scale. It counts from the arrival and from the range.
+// Settling: until the residual of a step through n RC poles (detector_settle_s) is ACQUIRE_RESIDUAL of
+// the signal before; and when the first sample shows that the signal fell, until it is that much of the
+// new signal. It counts from the arrival (or the light's change) and from the change of range.
 // Spacing: white noise through n equal poles is correlated over x = t / time constant by
 //   1: e^-x   2: (1 + x) e^-x   3: (1 + x + x^2/3) e^-x   4: (1 + x + 2x^2/5 + x^3/15) e^-x,
 // and the samples are spaced to a correlation of 0.05, where the sd of the mean of four taken as
@@ -16,7 +16,8 @@
 
 #define ACQUIRE_RESIDUAL 1e-4
 #define ACQUIRE_UNDER 0.2  // of the next smaller range's full scale: below it the next reading goes down
-#define ACQUIRE_POOR 0.01  // of its own full scale: below it the reading is made again, further down
+#define ACQUIRE_POOR 0.05  // of its own full scale: below it the reading is made again, further down:
+                           // there a step of 1/65536 full scale is 3e-4 of the signal
 
 // Where the ranging stands. Start with {.range = -1}; acquire_begin before each point.
 struct acquire {

@@ -24,6 +24,7 @@
 #define STEADY_REL 0.005          // change of the monitor in a second, to call it steady
 #define STEADY_LEAST_S 60.0       // how long it may take to become so, at least
 #define MONITOR_LOST 0.5          // of the monitor after warm-up: below it the light is lost
+#define AGAIN 1                   // not done, but nothing is wrong
 #define STORE_RETRY_NS CLK_S(1)
 
 struct engine {
@@ -310,8 +311,8 @@ static struct store_reading row_of(const struct engine *e, const struct acquire_
         .point = e->point->point,
         .attempt = e->attempt,
         .t_utc_ms = r->utc_ns / 1000000,
-        .theta_i_udeg = units_udeg(at->at[PART_THETA_I]),
-        .theta_r_udeg = units_udeg(at->at[PART_THETA_R]),
+        .theta_i_udeg = (int32_t)units_udeg(at->at[PART_THETA_I]),
+        .theta_r_udeg = (int32_t)units_udeg(at->at[PART_THETA_R]),
         .signal_v = r->signal_v,
         .signal_sd_v = r->signal_sd_v,
         .monitor_v = r->monitor_v,
@@ -496,13 +497,16 @@ static int prepare(struct engine *e)
     return rc;
 }
 
+// A dark needs no place: it is measured where the axes are, unless the plan says where.
 static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;
     struct travel_pose pose = {{p->theta_i_deg, p->theta_r_deg, 0.0}};
-    int rc = p->kind == PLAN_SAMPLE ? 0 : travel_station(e->in, p->station, &pose, &e->why);
-    if (!instrument_has(e->in, PART_SAMPLE))
-        pose.at[PART_SAMPLE] = NAN;
+    int rc = 0;
+    if (p->kind == PLAN_DARK && !p->station[0])
+        pose = (struct travel_pose){{NAN, NAN, NAN}};
+    else if (p->kind != PLAN_SAMPLE)
+        rc = travel_station(e->in, p->station, &pose, &e->why);
     return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
 }
 
@@ -563,6 +567,8 @@ static int measure(struct engine *e, const struct travel_pose *at)
         publish_reading(e, &r, at);
         if (r.accepted || !r.again)
             break;
+        if (!e->ready) // the store paused the run: light and axes first
+            return AGAIN;
     }
     return r.accepted ? 0 : no_more_attempts(e, &r);
 }
@@ -615,6 +621,8 @@ static int see_through(struct engine *e)
 {
     for (;;) {
         int rc = do_point(e);
+        if (rc == AGAIN)
+            continue;
         if (rc >= 0) {
             e->returns = 0;
             return 0;
@@ -672,8 +680,7 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .plan = plan,
         .state = RUN_QUEUED,
         .acquire = {.range = -1},
-        .omega_sr = UNITS_PI * bench->aperture_radius_mm * bench->aperture_radius_mm /
-                    (bench->distance_mm * bench->distance_mm),
+        .omega_sr = bench_omega_sr(bench),
         .monitor_dark_v = NAN,
         .monitor_lit_v = NAN,
         .opening = {NAN, NAN, NAN, NAN},

@@ -40,7 +40,7 @@ struct instrument {
     struct part_state part[PART_COUNT];
     int64_t retry_ns[PART_COUNT], backoff_ns[PART_COUNT];
 
-    struct bus *bus[BENCH_BUSES_MOST];
+    struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];
     struct safety *safety;
     struct laser_status laser;
@@ -242,14 +242,6 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
 
 // --- construction -----------------------------------------------------------------------------------
 
-static const struct bench_axis *find_axis(const struct bench_config *bench, const char *name)
-{
-    for (int i = 0; i < bench->axes_count; i++)
-        if (strcmp(bench->axes[i].name, name) == 0)
-            return &bench->axes[i];
-    return NULL;
-}
-
 static int find_bus(const struct bench_config *bench, const char *name)
 {
     for (int i = 0; i < bench->buses_count; i++)
@@ -274,7 +266,7 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
         in->part[part] = (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         struct motor *m = &in->motor[part];
-        *m = (struct motor){.config = find_axis(bench, part_names[part]), .bus = -1, .commanded = NAN,
+        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]), .bus = -1, .commanded = NAN,
                             .place = {.position = NAN, .target = NAN}};
         if (!m->config)
             in->part[part].link = PART_ABSENT;
@@ -350,7 +342,7 @@ void instrument_free(struct instrument *in)
             in->motor[i].axis->ops->stop(in->motor[i].axis, NULL);
             in->motor[i].axis->ops->free(in->motor[i].axis);
         }
-    for (int i = 0; i < BENCH_BUSES_MOST; i++)
+    for (int i = 0; i < BENCH_BUSES; i++)
         bus_close(in->bus[i]);
     if (in->detector)
         in->detector->ops->free(in->detector);
@@ -445,12 +437,12 @@ const struct bench_axis *instrument_axis(const struct instrument *in, enum instr
 
 static int32_t to_steps(const struct bench_axis *c, double position)
 {
-    return (int32_t)lround((position + c->zero) * c->steps_per_unit);
+    return (int32_t)lround((position - c->zero) * c->steps_per_unit);
 }
 
 static double of_steps(const struct bench_axis *c, int32_t steps)
 {
-    return steps / c->steps_per_unit - c->zero;
+    return steps / c->steps_per_unit + c->zero;
 }
 
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position)
@@ -509,8 +501,8 @@ int instrument_go(struct instrument *in, enum instrument_part part, double posit
     if (c->backlash > 0)
         m->engaged = rise >= 0 && (m->engaged || rise >= c->backlash);
     rc = m->axis->ops->move_abs(m->axis, to_steps(c, position),
-                                (int32_t)lround(c->speed * c->steps_per_unit),
-                                (int32_t)lround(c->acceleration * c->steps_per_unit), err);
+                                (int32_t)lround(fabs(c->speed * c->steps_per_unit)),
+                                (int32_t)lround(fabs(c->acceleration * c->steps_per_unit)), err);
     return note(in, part, rc, err);
 }
 

@@ -30,7 +30,7 @@ double travel_time_s(double distance, double speed, double acceleration)
 
 static double tolerance(const struct bench_axis *axis)
 {
-    return fmax(axis->deadband, 0.5 / axis->steps_per_unit) + 1e-9;
+    return fmax(axis->deadband, 0.5 / fabs(axis->steps_per_unit)) + 1e-9;
 }
 
 static const char *axis_name(const struct instrument *in, enum instrument_part part)
@@ -110,7 +110,7 @@ static int set_out(struct instrument *in, struct leg *t, const struct cancel *ca
     if (rc < 0)
         return rc;
 
-    const double half_step = 0.5 / axis->steps_per_unit;
+    const double half_step = 0.5 / fabs(axis->steps_per_unit);
     t->target = instrument_rounded(in, t->part, t->target);
     if (fabs(p.position - t->target) <= tolerance(axis) &&
         fabs(p.target - t->target) < half_step && instrument_engaged(in, t->part)) {
@@ -235,17 +235,11 @@ int travel_move(struct instrument *in, const struct travel_pose *target, const s
 int travel_station(const struct instrument *in, const char *name, struct travel_pose *ret_pose,
                    struct gon_error *err)
 {
-    const struct bench_config *bench = instrument_bench(in);
-    for (int i = 0; i < bench->stations_count; i++) {
-        const struct bench_station *s = &bench->stations[i];
-        if (strcmp(s->name, name) != 0)
-            continue;
-        ret_pose->at[PART_THETA_I] = s->theta_i_deg;
-        ret_pose->at[PART_THETA_R] = s->theta_r_deg;
-        ret_pose->at[PART_SAMPLE] = instrument_has(in, PART_SAMPLE) ? s->sample_mm : (double)NAN;
-        return 0;
-    }
-    return gon_fail(err, GON_E_INPUT, "the bench has no station \"%s\": add it to stations", name);
+    const struct bench_station *s = bench_find_station(instrument_bench(in), name);
+    if (!s)
+        return gon_fail(err, GON_E_INPUT, "the bench has no station \"%s\": add it to stations", name);
+    *ret_pose = (struct travel_pose){{s->theta_i_deg, s->theta_r_deg, s->sample_mm}};
+    return 0;
 }
 
 static int home_one(struct instrument *in, enum instrument_part part, const struct cancel *cancel,
