@@ -57,6 +57,18 @@ static void answer_stops(struct hub *h, int status, const char *body)
     h->stop_count = 0;
 }
 
+// In the file's history; how a run ended goes there when it is closed.
+static void keep_state(struct hub *h, const struct run *run)
+{
+    if (run->state != RUN_PREPARING && run->state != RUN_RUNNING && run->state != RUN_PAUSED)
+        return;
+    struct note *n = note_new(NOTE_STATE);
+    n->run = run->id;
+    n->state = run->state;
+    n->text = note_text(run->text);
+    note_post(h->store_box, n);
+}
+
 static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
@@ -66,6 +78,8 @@ static void changed(void *ctx, const struct run *run)
     if (bad)
         snprintf(h->last_error, sizeof h->last_error, "%s", run->text);
     publish(h, "state", view_run(run, false));
+    if (run == queue_active(h->queue))
+        keep_state(h, run);
     if (queue_idle(h->queue) && h->stop_count) {
         char *body = view_text(view_run(run, false));
         answer_stops(h, 200, body ? body : "{}");
@@ -353,7 +367,7 @@ static void mail_arrived(void *ctx)
 
 static int start_workers(struct hub *h, struct gon_error *err)
 {
-    struct storer_links s = {h->options.bench,      h->options.bench_text, h->options.directory,
+    struct storer_links s = {clk_system(), h->options.bench, h->options.bench_text, h->options.directory,
                              h->store_box, h->box, h->run_box};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
     struct runner_links r = {h->options.bench, h->cancel, h->run_box, h->box, h->store_box};

@@ -18,7 +18,7 @@ struct loop;
 
 struct hub_options {
     const struct bench_config *bench; // borrowed for the hub's life
-    const char *bench_text, *bench_name; // as read, for the campaign files
+    const char *bench_text; // as read, for the campaign files
     const char *directory;               // of the campaign files
     bool simulator;
     long seed;

@@ -17,10 +17,11 @@ enum note_kind {
     NOTE_CREATE,  // ticket, text: config, name: of its file: make a campaign file
     NOTE_LOOK,    // ticket, name: path: what is this campaign
     NOTE_OPEN,    // run, name: path: for writing
-    NOTE_READING, // sequence, thing: struct store_reading
-    NOTE_EVENT,   // sequence (0: nobody waits), level, source, text
+    NOTE_READING, // run, sequence, thing: struct store_reading
+    NOTE_EVENT,   // run, level, source, text
+    NOTE_STATE,   // run, state, text: why
     NOTE_FIT,     // run, sweep, last, thing: struct fit_outcome
-    NOTE_CLOSE,   // run, state
+    NOTE_CLOSE,   // run, state, text: why
     // to the instrument thread
     NOTE_START,   // run, thing: struct run_material
     NOTE_STORED,  // sequence, err

@@ -7,11 +7,13 @@
 #include "base/err.h"
 
 struct bench_config;
+struct clk;
 struct mail;
 struct note;
 struct storer;
 
 struct storer_links { // all borrowed for the storer's life
+    struct clk *clk;        // for the times in the file
     const struct bench_config *bench;
     const char *bench_text; // as read, for the campaign files
     const char *directory;  // where new campaigns go

@@ -31,6 +31,17 @@ json_t *view_run(const struct run *run, bool with_fit)
     return o;
 }
 
+json_t *view_flags(unsigned flags)
+{
+    char text[200], *rest = text, *name;
+    json_t *all = json_array();
+    store_flags_text(flags, text, sizeof text);
+    while ((name = strsep(&rest, ",")))
+        if (*(name += strspn(name, " ")))
+            json_array_append_new(all, json_string(name));
+    return all;
+}
+
 static void add_axis(json_t *o, const struct instrument_snapshot *s, int part)
 {
     json_object_set_new(o, "unit", json_string(s->axis[part].unit));

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include "cli/fit_options.h"
+
+#include "base/options.h"
+
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+static int choose(const char *option, const char *word, const char *const *words, struct gon_error *err)
+{
+    char all[200] = "";
+    for (int i = 0; words[i]; i++) {
+        if (!strcmp(word, words[i]))
+            return i;
+        snprintf(all + strlen(all), sizeof all - strlen(all), "%s%s", i ? ", " : "", words[i]);
+    }
+    const char *meant = options_suggest(word, words);
+    if (meant)
+        return gon_fail(err, GON_E_INPUT, "%s '%s': did you mean '%s'? allowed: %s", option, word, meant, all);
+    return gon_fail(err, GON_E_INPUT, "%s '%s': allowed: %s", option, word, all);
+}
+
+static int take_weights(const char *word, struct fit_options *o, struct gon_error *err)
+{
+    static const char *const words[] = {"uniform", "dense:G", "relative", "variance", NULL};
+    double g;
+    if (!strncmp(word, "dense:", 6)) {
+        if (options_real(word + 6, &g) < 0 || g <= 0)
+            return gon_fail(err, GON_E_INPUT, "--weights dense:G needs a number > 0 after the colon, not '%s'", word + 6);
+        o->weighting = FIT_DENSE;
+        o->dense_g = g;
+        return GON_OK;
+    }
+    int i = choose("--weights", word, words, err);
+    if (i == 1)
+        return gon_fail(err, GON_E_INPUT, "--weights dense:G needs a number in the place of G, for example dense:3");
+    if (i >= 0)
+        o->weighting = (enum fit_weighting)i;
+    return i < 0 ? i : GON_OK;
+}
+
+static double *bound_of(struct brdf_params *p, int param)
+{
+    double *const members[FIT_PARAMS] = {&p->n, &p->k, &p->sigma, &p->ks, &p->kd};
+    return members[param];
+}
+
+// One "name=low:high"; the text is changed.
+static int take_bound(char *text, struct fit_options *o, struct gon_error *err)
+{
+    char *equals = strchr(text, '='), *colon = equals ? strchr(equals, ':') : NULL;
+    double low, high;
+    if (!colon)
+        return gon_fail(err, GON_E_INPUT, "--bounds '%s' is not NAME=LOW:HIGH, for example n=1:3", text);
+    *equals = *colon = 0;
+    if (options_real(equals + 1, &low) < 0 || options_real(colon + 1, &high) < 0)
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: '%s:%s' are not two numbers", text, equals + 1, colon + 1);
+    if (!(low < high))
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is empty; low must be below high", text, low, high);
+    for (int p = 0; p < FIT_PARAMS; p++)
+        if (!strcmp(text, fit_param_name((enum fit_param)p))) {
+            *bound_of(&o->lower, p) = low;
+            *bound_of(&o->upper, p) = high;
+            return GON_OK;
+        }
+    return gon_fail(err, GON_E_INPUT, "--bounds: no parameter '%s'; allowed: n, k, sigma, ks, kd", text);
+}
+
+static int take_bounds(const char *text, struct fit_options *o, struct gon_error *err)
+{
+    char copy[400];
+    if (strlen(text) >= sizeof copy)
+        return gon_fail(err, GON_E_INPUT, "--bounds is longer than %zu characters", sizeof copy - 1);
+    strcpy(copy, text);
+    for (char *part = copy, *end; part; part = end ? end + 1 : NULL) {
+        end = strchr(part, ',');
+        if (end)
+            *end = 0;
+        int rc = take_bound(part, o, err);
+        if (rc < 0)
+            return rc;
+    }
+    return GON_OK;
+}
+
+int fit_words_take(const struct fit_words *words, struct fit_options *options, struct gon_error *err)
+{
+    static const char *const methods[] = {"memetic", "paper", NULL}, *const diffuses[] = {"paper", "lambert", NULL};
+    struct fit_options o = *options;
+    int rc = GON_OK;
+    if (words->method && (rc = choose("--method", words->method, methods, err)) >= 0)
+        o.method = (enum fit_method)rc;
+    if (rc >= 0 && words->diffuse && (rc = choose("--diffuse", words->diffuse, diffuses, err)) >= 0)
+        o.diffuse = (enum brdf_diffuse)rc;
+    if (rc >= 0 && words->weights)
+        rc = take_weights(words->weights, &o, err);
+    if (rc >= 0 && words->bounds)
+        rc = take_bounds(words->bounds, &o, err);
+    if (rc < 0)
+        return rc;
+    *options = o;
+    return GON_OK;
+}
+
+int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_error *err)
+{
+    char copy[1000];
+    double deg[FIT_MOST_ANGLES];
+    int count = 0;
+    if (strlen(text) >= sizeof copy)
+        return gon_fail(err, GON_E_INPUT, "--theta-i is longer than %zu characters", sizeof copy - 1);
+    strcpy(copy, text);
+    for (char *part = copy, *end; part; part = end ? end + 1 : NULL) {
+        end = strchr(part, ',');
+        if (end)
+            *end = 0;
+        if (count == most || count == FIT_MOST_ANGLES)
+            return gon_fail(err, GON_E_INPUT, "--theta-i: at most %d angles", most);
+        if (options_real(part, &deg[count]) < 0 || deg[count] < 0 || deg[count] >= 90)
+            return gon_fail(err, GON_E_INPUT, "--theta-i '%s' is not an angle of 0..90 deg; give a list: 0,10,20", part);
+        count++;
+    }
+    memcpy(ret_deg, deg, (size_t)count * sizeof *deg);
+    return count;
+}

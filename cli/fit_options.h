@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+// The options of `gonio fit` as text and what they mean for the fit.
+#pragma once
+#include "base/err.h"
+#include "fit/fit.h"
+
+enum { FIT_MOST_ANGLES = 64 };
+
+struct fit_words { // NULL: not given
+    const char *weights; // "uniform", "dense:G", "relative", "variance"
+    const char *method;  // "memetic", "paper"
+    const char *diffuse; // "paper", "lambert"
+    const char *bounds;  // "n=0.2:8,kd=0:0.5"
+};
+
+// Changes what the words name in options and leaves the rest. GON_E_INPUT says which word is wrong.
+int fit_words_take(const struct fit_words *words, struct fit_options *options, struct gon_error *err);
+
+// "0,10,20.5" into degrees: the count.
+int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_error *err);

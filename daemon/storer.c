@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/storer.h"
+
+#include "base/clk.h"
+#include "campaign/catalog.h"
+#include "campaign/reduce.h"
+#include "campaign/store.h"
+#include "daemon/material.h"
+#include "daemon/note.h"
+#include "daemon/outcome.h"
+#include "daemon/queue.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct storer {
+    struct storer_links links;
+    pthread_t thread;
+    struct store *store; // open for writing; NULL: none
+    int run;
+    char state[16]; // the last written
+};
+
+struct storer *storer_new(const struct storer_links *links)
+{
+    struct storer *s = calloc(1, sizeof *s);
+    if (s)
+        s->links = *links;
+    return s;
+}
+
+void storer_free(struct storer *s)
+{
+    if (!s)
+        return;
+    store_close(s->store, NULL);
+    free(s);
+}
+
+void run_material_free(void *material)
+{
+    struct run_material *m = material;
+    if (m)
+        plan_clear(&m->plan);
+    free(m);
+}
+
+static int64_t utc_ms(const struct storer *s)
+{
+    return clk_utc_ns(s->links.clk) / 1000000;
+}
+
+// --- which campaigns there are --------------------------------------------------------------------
+
+static enum run_state state_of(const char *name)
+{
+    if (!strcmp(name, "done"))
+        return RUN_DONE;
+    if (!strcmp(name, "failed") || !strcmp(name, "unreadable"))
+        return RUN_FAILED;
+    return RUN_STOPPED; // also of a daemon that died, or before it ever ran: it can go on
+}
+
+static struct run *run_of(const struct catalog_entry *e)
+{
+    struct run *run = calloc(1, sizeof *run);
+    if (!run)
+        return NULL;
+    *run = (struct run){.id = e->id, .state = state_of(e->state), .point = e->done, .points = e->total,
+                        .theta_i_deg = NAN, .theta_r_deg = NAN, .f_per_sr = NAN, .u_per_sr = NAN,
+                        .left_s = NAN};
+    snprintf(run->path, sizeof run->path, "%s", e->path);
+    snprintf(run->name, sizeof run->name, "%s", e->name);
+    snprintf(run->sample, sizeof run->sample, "%s", e->sample);
+    if (run->state != RUN_DONE)
+        snprintf(run->text, sizeof run->text, "%s", e->problem);
+    return run;
+}
+
+static void list(struct storer *s)
+{
+    struct catalog_entry *entries = NULL;
+    struct note *end = note_new(NOTE_LISTED);
+    int count = catalog_list(s->links.directory, &entries, &end->err);
+    for (int i = 0; i < count; i++) {
+        struct note *n = note_new(NOTE_LISTED);
+        n->thing = entries[i].id > 0 ? run_of(&entries[i]) : NULL;
+        if (n->thing)
+            note_post(s->links.to_main, n);
+        else
+            note_free(n);
+    }
+    free(entries);
+    note_post(s->links.to_main, end);
+}
+
+// --- a new campaign -------------------------------------------------------------------------------
+
+static void add_line(void *ctx, const char *line)
+{
+    char **text = ctx;
+    char *more = NULL;
+    if (asprintf(&more, "%s%s%s", *text ? *text : "", *text ? "\n" : "", line) < 0)
+        return;
+    free(*text);
+    *text = more;
+}
+
+static int create_file(struct storer *s, const struct campaign_config *config, const struct note *n,
+                       char *ret_path, size_t size, struct gon_error *err)
+{
+    struct plan plan = {0};
+    struct store *store = NULL;
+    int id, rc = plan_make(config, s->links.bench, &plan, err);
+    if (rc < 0)
+        return rc;
+    struct store_new what = {config, n->text, n->name, s->links.bench, s->links.bench_text, &plan, utc_ms(s)};
+    rc = catalog_create(s->links.directory, &what, &store, &id, err);
+    if (rc == 0)
+        snprintf(ret_path, size, "%s", store_path(store));
+    store_close(store, NULL); // opened again when its turn comes
+    plan_clear(&plan);
+    return rc;
+}
+
+static void answer_known(struct storer *s, const struct note *question, int rc, const struct gon_error *err,
+                         const char *path, char *complaints)
+{
+    struct catalog_entry e;
+    struct note *n = note_new(NOTE_KNOWN);
+    n->ticket = question->ticket;
+    n->text = complaints;
+    if (rc < 0)
+        n->err = *err;
+    else if (catalog_read(path, &e) == 0 && (e.id = catalog_id(path)) > 0)
+        n->thing = run_of(&e);
+    if (rc == 0 && !n->thing)
+        gon_fail(&n->err, GON_E_INPUT, "%s: not a numbered campaign file; see: gonio list", path);
+    note_post(s->links.to_main, n);
+}
+
+static void create(struct storer *s, const struct note *n)
+{
+    struct campaign_config config;
+    char path[CATALOG_PATH] = "", *complaints = NULL;
+    struct gon_error err = {GON_E_INPUT, "the campaign is wrong"};
+    int rc = campaign_config_parse(n->text, n->name, (struct cfg_sink){add_line, &complaints}, &config);
+    if (rc == 0)
+        rc = create_file(s, &config, n, path, sizeof path, &err);
+    answer_known(s, n, rc, &err, path, complaints);
+}
+
+// Only files of our own directory: a number elsewhere would be somebody else's.
+static void look(struct storer *s, const struct note *n)
+{
+    struct gon_error err;
+    char path[CATALOG_PATH], folder[CATALOG_PATH];
+    int rc = catalog_resolve(s->links.directory, n->name, path, sizeof path, &err);
+    if (rc == 0) {
+        snprintf(folder, sizeof folder, "%s", path);
+        char *slash = strrchr(folder, '/'), *real = NULL, *ours = realpath(s->links.directory, NULL);
+        if (slash)
+            *slash = 0;
+        real = realpath(slash ? folder : ".", NULL);
+        if (!real || !ours || strcmp(real, ours))
+            rc = gon_fail(&err, GON_E_INPUT, "%s is not in the daemon's folder; copy it to %s first", path,
+                          s->links.directory);
+        free(real);
+        free(ours);
+    }
+    answer_known(s, n, rc, &err, path, NULL);
+}
+
+// --- the campaign that is measured ----------------------------------------------------------------
+
+static int same_number(const char *what, double then, double now, const char *unit, struct gon_error *err)
+{
+    if (then == now)
+        return GON_OK;
+    return gon_fail(err, GON_E_REFUSED,
+                    "the campaign was begun on another bench: %s %g %s then, %g now; go on with that bench", what,
+                    then, unit, now);
+}
+
+// Links, names and speeds may change between two days of a campaign; what its numbers mean may not.
+static int same_bench(const struct bench_config *then, const struct bench_config *now, struct gon_error *err)
+{
+    int rc = same_number("wavelength", then->wavelength_nm, now->wavelength_nm, "nm", err);
+    rc = rc < 0 ? rc : same_number("aperture radius", then->aperture_radius_mm, now->aperture_radius_mm, "mm", err);
+    rc = rc < 0 ? rc : same_number("distance", then->distance_mm, now->distance_mm, "mm", err);
+    rc = rc < 0 ? rc : same_number("laser power", then->laser.power_w, now->laser.power_w, "W", err);
+    if (rc == 0 && then->regime != now->regime)
+        rc = gon_fail(err, GON_E_REFUSED, "the campaign was begun in the other regime; go on with that bench");
+    if (rc == 0 && then->laser.polarisation != now->laser.polarisation)
+        rc = gon_fail(err, GON_E_REFUSED, "the campaign was begun with polarisation %s, the bench has %s; go on with that bench",
+                      polarisation_name((enum polarisation)then->laser.polarisation),
+                      polarisation_name((enum polarisation)now->laser.polarisation));
+    return rc;
+}
+
+static int read_opening(struct store *store, struct run_material *m, struct gon_error *err)
+{
+    struct store_reading *rows = NULL;
+    int count = store_read_readings(store, 0, &rows, err);
+    if (count < 0)
+        return count;
+    struct reduce_reference r = reduce_opening(&m->plan, rows, count);
+    m->opening = (struct engine_opening){r.dark_signal_v, r.dark_monitor_v, r.beam_signal_v, r.beam_monitor_v};
+    m->has_opening = count > 0;
+    free(rows);
+    return GON_OK;
+}
+
+static int read_material(struct storer *s, struct run_material *m, struct gon_error *err)
+{
+    struct bench_config then;
+    int rc = store_read_config(s->store, &m->config, err);
+    rc = rc < 0 ? rc : store_read_bench(s->store, &then, err);
+    rc = rc < 0 ? rc : same_bench(&then, s->links.bench, err);
+    rc = rc < 0 ? rc : store_read_plan(s->store, &m->plan, err);
+    return rc < 0 ? rc : read_opening(s->store, m, err);
+}
+
+static void open_run(struct storer *s, const struct note *n)
+{
+    struct note *answer = note_new(NOTE_OPENED);
+    struct run_material *m = calloc(1, sizeof *m);
+    answer->run = n->run;
+    int rc = m ? store_open(n->name, STORE_WRITE, &s->store, &answer->err)
+               : gon_fail(&answer->err, GON_E_SYSTEM, "store: out of memory");
+    if (rc == 0) {
+        rc = read_material(s, m, &answer->err);
+        if (rc < 0) {
+            store_close(s->store, NULL);
+            s->store = NULL;
+        }
+    }
+    if (rc == 0) {
+        s->run = n->run;
+        *s->state = 0;
+        answer->thing = m;
+        answer->drop = run_material_free;
+    } else {
+        run_material_free(m);
+    }
+    note_post(s->links.to_main, answer);
+}
+
+static void append_reading(struct storer *s, const struct note *n)
+{
+    struct note *answer = note_new(NOTE_STORED);
+    answer->sequence = n->sequence;
+    if (!s->store || n->run != s->run)
+        gon_fail(&answer->err, GON_E_STORE, "store: run %d has no open file", n->run);
+    else if (store_append_reading(s->store, n->thing, &answer->err) == 0)
+        answer->err.code = GON_OK;
+    note_post(s->links.to_runner, answer);
+}
+
+static int append_state(struct storer *s, const struct note *n, struct gon_error *err)
+{
+    const char *name = n->state == RUN_PREPARING ? "running" : run_state_name(n->state);
+    const char *why = n->text ? n->text : "";
+    if (!s->store || n->run != s->run || (!strcmp(name, s->state) && !*why))
+        return GON_OK;
+    snprintf(s->state, sizeof s->state, "%s", name);
+    return store_append_state(s->store, utc_ms(s), name, why, err);
+}
+
+static void append_fit(struct storer *s, const struct note *n)
+{
+    struct fit_outcome *o = n->thing;
+    struct note *answer = note_new(NOTE_FITTED);
+    int64_t id;
+    answer->run = n->run;
+    answer->sweep = n->sweep;
+    answer->last = n->last;
+    int rc = s->store && n->run == s->run
+                 ? store_append_reduction(s->store, utc_ms(s), &o->reduction, &o->record.reduction, &answer->err)
+                 : gon_fail(&answer->err, GON_E_STORE, "store: run %d has no open file", n->run);
+    if (rc == 0)
+        rc = store_append_fit(s->store, utc_ms(s), &o->record, &id, &answer->err);
+    if (rc == 0) {
+        answer->text = fit_json(&o->record, 0);
+        answer->err.code = GON_OK;
+    }
+    note_post(s->links.to_main, answer);
+}
+
+static void close_run(struct storer *s, const struct note *n)
+{
+    struct note *answer = note_new(NOTE_CLOSED);
+    answer->run = n->run;
+    if (append_state(s, n, &answer->err) == 0)
+        answer->err.code = GON_OK;
+    store_close(s->store, NULL); // a checkpoint that failed loses nothing: the next opening makes it
+    s->store = NULL;
+    s->run = 0;
+    note_post(s->links.to_main, answer);
+}
+
+void storer_step(struct storer *s, struct note *n)
+{
+    switch ((enum note_kind)n->letter.kind) {
+    case NOTE_LIST: list(s); break;
+    case NOTE_CREATE: create(s, n); break;
+    case NOTE_LOOK: look(s, n); break;
+    case NOTE_OPEN: open_run(s, n); break;
+    case NOTE_READING: append_reading(s, n); break;
+    case NOTE_EVENT:
+        if (s->store && n->run == s->run)
+            store_append_event(s->store, utc_ms(s), n->level, n->source, n->text ? n->text : "", NULL);
+        break;
+    case NOTE_STATE: append_state(s, n, NULL); break;
+    case NOTE_FIT: append_fit(s, n); break;
+    case NOTE_CLOSE: close_run(s, n); break;
+    default: break;
+    }
+    note_free(n);
+}
+
+// --- the thread -----------------------------------------------------------------------------------
+
+static void *thread_main(void *ctx)
+{
+    struct storer *s = ctx;
+    for (struct note *n; (n = note_wait(s->links.box, -1));) {
+        bool quit = n->letter.kind == NOTE_QUIT;
+        storer_step(s, n);
+        if (quit)
+            break;
+    }
+    return NULL;
+}
+
+int storer_start(const struct storer_links *links, struct storer **ret_storer, struct gon_error *err)
+{
+    struct storer *s = storer_new(links);
+    if (!s)
+        return gon_fail(err, GON_E_SYSTEM, "store thread: out of memory");
+    int failed = pthread_create(&s->thread, NULL, thread_main, s);
+    if (failed) {
+        storer_free(s);
+        return gon_fail(err, GON_E_SYSTEM, "store thread: %s", strerror(failed));
+    }
+    *ret_storer = s;
+    return GON_OK;
+}
+
+void storer_join(struct storer *s)
+{
+    if (!s)
+        return;
+    pthread_join(s->thread, NULL);
+    storer_free(s);
+}

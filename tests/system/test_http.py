@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""The daemon's HTTP: shapes, limits, replay. One simulated daemon serves all tests of this file."""
+import json
+import os
+import socket
+import stat
+
+import pytest
+
+from conftest import PATIENCE_S, Stream
+
+
+def raw(daemon, data):
+    """Bytes in, what comes back until the server closes or a whole answer with a JSON body is there."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as s:
+        s.settimeout(PATIENCE_S)
+        s.connect(str(daemon.socket))
+        s.sendall(data)
+        answer = b""
+        while not answer.endswith(b"}"):
+            part = s.recv(65536)
+            if not part:
+                break
+            answer += part
+    return answer
+
+
+def test_status_has_devices_and_no_run(daemon):
+    s = daemon.status()
+    assert s["simulator"] is True and s["seed"] == 7 and s["pid"] == daemon.pid
+    assert s["run"] is None and s["queued"] == []
+    devices = {d["name"]: d for d in s["devices"]}
+    assert set(devices) == {"theta_i", "theta_r", "sample", "laser", "detector"}
+    assert all(d["link"] == "ok" for d in devices.values()), devices
+    assert devices["laser"]["emission"] is False
+    assert devices["theta_i"]["unit"] == "deg"
+
+
+def test_socket_is_for_owner_and_group(daemon):
+    assert stat.S_IMODE(os.stat(daemon.socket).st_mode) == 0o660
+
+
+def test_unknown_resources_and_methods(daemon):
+    status, body = daemon.request("GET", "/api/v1/nothing")
+    assert status == 404 and set(body) == {"error", "where", "what_to_do"}
+    assert daemon.request("GET", "/api/v1/runs/999")[0] == 404
+    assert daemon.request("GET", "/api/v1/runs/x")[0] == 404
+    status, body = daemon.request("DELETE", "/api/v1/runs")
+    assert status == 405 and "GET, POST" in body["what_to_do"]
+    assert daemon.request("GET", "/api/v1/stop")[0] == 405
+
+
+@pytest.mark.parametrize("body", [
+    "", "{", "[]", "[1,2]", "null", '{"config": 7}', '{"config": "x", "extra": 1}', '{"resume": -1}',
+    '{"resume": 1.5}', '{"resume": null}', '{"config": "a", "config": "b"}', b'{"config": "\xff"}',
+    '{"config": "a"} trailing', "[" * 5000,
+])
+def test_bodies_that_are_not_what_was_asked_for(daemon, body):
+    status, reply = daemon.request("POST", "/api/v1/runs", body)
+    assert status == 400, reply
+    assert reply["error"] and reply["what_to_do"]
+
+
+def test_a_wrong_configuration_names_its_lines(daemon):
+    config = 'campaign: {\n  name = "x";\n  theta_i_deg = [ 0.0, 95.0 ];\n  stpe = 3;\n};\n'
+    status, reply = daemon.request("POST", "/api/v1/runs", {"config": config, "name": "configs/bad.cfg"})
+    assert status == 400
+    text = json.dumps(reply)
+    assert "configs/bad.cfg:3" in text and "configs/bad.cfg:4" in text and "stpe" in text
+    assert daemon.request("GET", "/api/v1/runs")[1]["runs"] == []
+
+
+def test_nothing_to_pause_or_resume_is_a_conflict(daemon):
+    for what in ("pause", "resume"):
+        status, reply = daemon.request("POST", f"/api/v1/{what}")
+        assert status == 409 and "no run is active" in reply["error"]
+    assert daemon.request("POST", "/api/v1/runs", {"resume": 999})[0] == 400
+    assert daemon.request("POST", "/api/v1/runs", {"resume": "/nowhere.gonio"})[0] in (400, 404)
+
+
+def test_a_stop_with_nothing_to_stop_halts_all_the_same(daemon):
+    before = daemon.sim_control(do="state")
+    status, reply = daemon.request("POST", "/api/v1/stop")
+    assert status == 200 and reply["run"] is None
+    after = daemon.sim_control(do="state")
+    assert after != before  # OFF was sent once more
+
+
+def test_two_lengths_are_refused(daemon):
+    head = b"POST /api/v1/runs HTTP/1.1\r\nHost: x\r\n"
+    both = raw(daemon, head + b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n")
+    assert both.startswith(b"HTTP/1.1 400")
+    twice = raw(daemon, head + b"Content-Length: 2\r\nContent-Length: 3\r\n\r\n{}")
+    assert twice.startswith(b"HTTP/1.1 400")
+
+
+def test_sizes_are_limited(daemon):
+    status, _ = daemon.request("POST", "/api/v1/runs", "x" * (64 * 1024 + 1))
+    assert status == 413
+    assert raw(daemon, b"GET /api/v1/status HTTP/1.1\r\nX: " + b"y" * 8300 + b"\r\n\r\n").startswith(b"HTTP/1.1 431")
+    assert raw(daemon, b"GET /api/v1/status HTTP/1.1\r\nX: " + b"y" * 200000).startswith(b"HTTP/1.1 431")
+
+
+def test_garbage_is_survived(daemon):
+    for data in (b"\0" * 100, b"GET\r\n\r\n", b"\xff\xfe\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n"):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as s:
+            s.settimeout(PATIENCE_S)
+            s.connect(str(daemon.socket))
+            s.sendall(data)
+            s.shutdown(socket.SHUT_WR)
+            while s.recv(65536):
+                pass
+    assert daemon.status()["pid"] == daemon.pid
+
+
+def test_the_ninth_stream_is_refused_and_a_closed_one_makes_room(daemon):
+    streams = [Stream(daemon.socket) for _ in range(8)]
+    assert all(s.response.status == 200 for s in streams)
+    ninth = Stream(daemon.socket)
+    assert ninth.response.status == 503
+    ninth.close()
+    for s in streams:
+        s.close()
+
+
+def test_last_event_id_must_be_a_number(daemon):
+    s = Stream(daemon.socket, last_id="yesterday")
+    assert s.response.status == 400
+    s.close()

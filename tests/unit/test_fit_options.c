@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// uses: cli campaign drivers fit model base
+#include "cli/fit_options.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <string.h>
+
+static void words_change_what_they_name(void **state)
+{
+    (void)state;
+    struct fit_options o = fit_options_default(), before = o;
+    struct fit_words w = {"dense:3.5", "paper", "lambert", "n=1:3,kd=0:0.1"};
+    assert_int_equal(fit_words_take(&w, &o, NULL), 0);
+    assert_int_equal(o.weighting, FIT_DENSE);
+    assert_true(o.dense_g == 3.5);
+    assert_int_equal(o.method, FIT_PAPER);
+    assert_int_equal(o.diffuse, BRDF_DIFFUSE_LAMBERT);
+    assert_true(o.lower.n == 1 && o.upper.n == 3 && o.lower.kd == 0 && o.upper.kd == 0.1);
+    assert_true(o.lower.sigma == before.lower.sigma && o.upper.sigma == before.upper.sigma);
+    w = (struct fit_words){"variance", NULL, NULL, NULL};
+    assert_int_equal(fit_words_take(&w, &o, NULL), 0);
+    assert_int_equal(o.weighting, FIT_VARIANCE);
+    assert_int_equal(o.method, FIT_PAPER);
+}
+
+static void refuses(struct fit_words w, const char *text)
+{
+    struct gon_error err = {0};
+    struct fit_options o = fit_options_default();
+    assert_int_equal(fit_words_take(&w, &o, &err), GON_E_INPUT);
+    if (!strstr(err.text, text))
+        fail_msg("'%s' is not in '%s'", text, err.text);
+}
+
+static void wrong_words_are_refused_by_name(void **state)
+{
+    (void)state;
+    refuses((struct fit_words){.weights = "unifrom"}, "did you mean 'uniform'");
+    refuses((struct fit_words){.weights = "dense:x"}, "a number > 0 after the colon, not 'x'");
+    refuses((struct fit_words){.weights = "dense:-1"}, "--weights dense:G");
+    refuses((struct fit_words){.weights = "dense:G"}, "a number > 0");
+    refuses((struct fit_words){.weights = "dense"}, "dense:G");
+    refuses((struct fit_words){.method = "simplex"}, "allowed: memetic, paper");
+    refuses((struct fit_words){.bounds = "n=1"}, "NAME=LOW:HIGH");
+    refuses((struct fit_words){.bounds = "n=1:2,q=1:2"}, "no parameter 'q'");
+    refuses((struct fit_words){.bounds = "n=2:1"}, "is empty");
+    refuses((struct fit_words){.bounds = "n=1:nan"}, "not two numbers");
+}
+
+static void angles_are_a_list(void **state)
+{
+    (void)state;
+    struct gon_error err;
+    double deg[3];
+    assert_int_equal(fit_angles_take("0,10,20.5", deg, 3, &err), 3);
+    assert_true(deg[0] == 0 && deg[1] == 10 && deg[2] == 20.5);
+    assert_int_equal(fit_angles_take("0,1,2,3", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("0,,3", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("90", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("-1", deg, 3, &err), GON_E_INPUT);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(words_change_what_they_name),
+        cmocka_unit_test(wrong_words_are_refused_by_name),
+        cmocka_unit_test(angles_are_a_list),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
