@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Question and answer in lines of text over a transport: terminators, echo, minimum gap between
-// commands, reassembly of partial lines, a cap on their length, and resynchronisation.
+// commands, reassembly of partial lines, a cap on their length (4 KiB), and resynchronisation.
 //
 // After any timeout or unreadable answer the link is out of step: a late answer would be taken for the
-// next one's. So the next query first drains and asks a question whose answer is known. Thread: one.
+// next one's. So the next query first drains until quiet_ns of silence and asks a question whose answer
+// is known. What came unasked before a command is dropped, and an answer with more behind it is not
+// believed (one of the two is late). What no line protocol without checksum can see: a late double that
+// comes after the next command was sent, and a changed digit; so drivers give neighbouring queries
+// different shapes and check the range of what comes. Thread: one.
 #pragma once
 #include "drivers/transport.h"
+
+#include <stdbool.h>
 
 struct message;
 
@@ -19,19 +25,36 @@ struct message_format {
     const char *sync_begins; // this beginning; NULL query: draining is all
 };
 
-// Takes over the transport. The format's strings are borrowed for the object's life.
+// Takes over the transport. The format and its strings are borrowed for the object's life and may be
+// changed between calls. NULL without memory (the transport then is closed).
 struct message *message_new(struct transport *t, const struct message_format *format);
 void message_free(struct message *m); // closes the transport
 
 // Sends and returns the answer without its terminator. GON_E_LINK: no or no usable answer (the link
-// resynchronises by itself before the next query); GON_E_GONE: unplugged; text then names the query.
+// resynchronises by itself before the next query); GON_E_GONE: unplugged; GON_E_DEVICE: the device sends
+// back what it is told (echo). The text then names the query.
 int message_query(struct message *m, const char *command, char *ret_answer, size_t size,
                   struct gon_error *err);
 int message_send(struct message *m, const char *command, struct gon_error *err); // expects no answer
+// The same whatever the cancel token and the state of the link, and with at_once whatever the gap; for
+// what must be said in any case. What the device answers is dropped before the next query.
+int message_send_blind(struct message *m, const char *command, bool at_once, struct gon_error *err);
 int message_out_of_step(struct message *m, const char *why); // the caller saw nonsense; returns GON_E_LINK
-int message_reopen(struct message *m, struct gon_error *err);
+int message_reopen(struct message *m, struct gon_error *err); // one try; also gets into step
+
+// A query that may be repeated: up to 3 times while the link fails or read says that the answer is
+// nonsense (non-zero; it fills what ctx points to, and may fill err).
+int message_ask(struct message *m, const char *command,
+                int (*read)(const char *answer, void *ctx, struct gon_error *err), void *ctx,
+                struct gon_error *err);
+int message_ask_number(struct message *m, const char *command, double *ret_value, struct gon_error *err);
+int message_ask_text(struct message *m, const char *command, char *ret_text, size_t size,
+                     struct gon_error *err);
+
+struct transport *message_transport(const struct message *m);
 const struct transport_stats *message_stats(const struct message *m);
 
 // A number as instruments write it: optional sign, digits, decimal point, exponent of any length; the
 // whole text but for blanks. A comma, "nan", "inf", 9.9e37 (overflow) or anything left over is an error.
+// Independent of the locale; correct to one unit in the last place.
 int message_number(const char *text, double *ret_value, struct gon_error *err);

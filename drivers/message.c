@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: MIT
+#include "drivers/message.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LINE_MOST 4096
+#define COMMAND_MOST 256
+#define TRIES 3
+#define WRITE_NS CLK_MS(200) // for a command to leave
+
+struct message {
+    struct transport *t;
+    const struct message_format *format;
+    bool out_of_step;
+    bool stray;       // a command's answer may still come that nobody wants
+    int64_t ready_ns; // the next command not before
+    size_t have;
+    char in[LINE_MOST];
+};
+
+struct message *message_new(struct transport *t, const struct message_format *format)
+{
+    struct message *m = calloc(1, sizeof *m);
+    if (!m) {
+        transport_close(t);
+        return NULL;
+    }
+    m->t = t;
+    m->format = format;
+    m->ready_ns = clk_now_ns(transport_clk(t));
+    return m;
+}
+
+void message_free(struct message *m)
+{
+    if (!m)
+        return;
+    transport_close(m->t);
+    free(m);
+}
+
+struct transport *message_transport(const struct message *m)
+{
+    return m->t;
+}
+
+const struct transport_stats *message_stats(const struct message *m)
+{
+    return transport_stats(m->t);
+}
+
+int message_out_of_step(struct message *m, const char *why)
+{
+    (void)why; // the caller's text says it; here it documents the call
+    m->out_of_step = true;
+    transport_book(m->t)->garbled++;
+    return GON_E_LINK;
+}
+
+// Bytes as a person can read them: what is not printable as \xNN.
+static const char *readable(const char *bytes, size_t size, char *out, size_t out_size)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < size && used + 5 < out_size; i++) {
+        unsigned char c = (unsigned char)bytes[i];
+        used += (size_t)snprintf(out + used, out_size - used, c >= 0x20 && c < 0x7f ? "%c" : "\\x%02x", c);
+    }
+    out[used] = 0;
+    return out;
+}
+
+static int garbled(struct message *m, const char *command, const char *what, size_t size,
+                   struct gon_error *err)
+{
+    char shown[120];
+    message_out_of_step(m, what);
+    return gon_fail(err, GON_E_LINK, "%s: '%s': %s: '%s'", transport_link(m->t), command, what,
+                    readable(m->in, size, shown, sizeof shown));
+}
+
+// --- sending ----------------------------------------------------------------------------------------
+
+static int put(struct message *m, const char *command, struct gon_error *err)
+{
+    char line[COMMAND_MOST];
+    int n = snprintf(line, sizeof line, "%s%s", command, m->format->end_out);
+    assert(n > 0 && (size_t)n < sizeof line);
+    struct clk *clk = transport_clk(m->t);
+    int rc = transport_write(m->t, line, (size_t)n, clk_now_ns(clk) + WRITE_NS, err);
+    m->ready_ns = clk_now_ns(clk) + m->format->min_gap_ns;
+    if (rc == GON_E_LINK || rc == GON_E_CANCELED) // half a command may have left
+        m->out_of_step = true;
+    return rc;
+}
+
+int message_send_blind(struct message *m, const char *command, bool at_once, struct gon_error *err)
+{
+    const struct cancel *cancel = transport_mind(m->t, NULL);
+    if (!at_once)
+        clk_sleep_until(transport_clk(m->t), m->ready_ns, NULL);
+    int rc = put(m, command, err);
+    transport_mind(m->t, cancel);
+    m->stray = true;
+    return rc;
+}
+
+static int wait_gap(struct message *m, struct gon_error *err)
+{
+    if (clk_sleep_until(transport_clk(m->t), m->ready_ns, transport_cancel(m->t)) < 0)
+        return gon_fail(err, GON_E_CANCELED, "%s: stopped before a command", transport_link(m->t));
+    return 0;
+}
+
+// --- one question ------------------------------------------------------------------------------------
+
+static char *find_end(struct message *m)
+{
+    size_t length = strlen(m->format->end_in);
+    return m->have < length ? NULL : memmem(m->in, m->have, m->format->end_in, length);
+}
+
+// Fills m->in until a line is complete; its length.
+static int take_line(struct message *m, const char *command, struct gon_error *err)
+{
+    const int64_t deadline_ns = clk_now_ns(transport_clk(m->t)) + m->format->timeout_ns;
+    char *end;
+    m->have = 0;
+    while (!(end = find_end(m))) {
+        if (m->have == sizeof m->in)
+            return garbled(m, command, "4096 bytes without an end", 40, err);
+        int rc = transport_read(m->t, m->in + m->have, sizeof m->in - m->have, deadline_ns, err);
+        if (rc == GON_E_LINK && m->have > 0) {
+            transport_book(m->t)->timeouts++;
+            return garbled(m, command, "the answer breaks off", m->have, err);
+        }
+        if (rc == GON_E_LINK) {
+            transport_book(m->t)->timeouts++;
+            gon_fail(err, rc, "%s: '%s': no answer in %.0f ms", transport_link(m->t), command,
+                     (double)m->format->timeout_ns * 1e-6);
+        }
+        if (rc < 0) {
+            m->out_of_step = true;
+            return rc;
+        }
+        m->have += (size_t)rc;
+    }
+    m->ready_ns = clk_now_ns(transport_clk(m->t)) + m->format->min_gap_ns;
+    return (int)(end - m->in);
+}
+
+static bool is_printable(const char *bytes, size_t size)
+{
+    for (size_t i = 0; i < size; i++)
+        if ((unsigned char)bytes[i] < 0x20 || (unsigned char)bytes[i] > 0x7e)
+            return false;
+    return true;
+}
+
+// The line as an answer: one line and no more, readable, not empty, not the command itself.
+static int take_answer(struct message *m, const char *command, char *ret_answer, size_t size,
+                       struct gon_error *err)
+{
+    int n = take_line(m, command, err);
+    if (n < 0)
+        return n;
+    size_t begin = 0, end = (size_t)n;
+    const bool more = m->have > end + strlen(m->format->end_in);
+    while (begin < end && strchr(" \t\r\n", m->in[begin]) && m->in[begin])
+        begin++;
+    while (end > begin && strchr(" \t", m->in[end - 1]) && m->in[end - 1])
+        end--;
+    if (end - begin == strlen(command) && memcmp(m->in + begin, command, end - begin) == 0) {
+        m->out_of_step = true; // the real answer follows
+        return gon_fail(err, GON_E_DEVICE, "%s: sends back the command '%s'; turn its echo off",
+                        transport_link(m->t), command);
+    }
+    if (more)
+        return garbled(m, command, "two answers to one question", m->have, err);
+    if (begin == end)
+        return garbled(m, command, "an empty answer", end, err);
+    if (!is_printable(m->in + begin, end - begin))
+        return garbled(m, command, "unreadable bytes in the answer (wrong baud rate?)", end, err);
+    if (end - begin >= size)
+        return garbled(m, command, "the answer is too long", end, err);
+    memcpy(ret_answer, m->in + begin, end - begin);
+    ret_answer[end - begin] = 0;
+    return 0;
+}
+
+static int exchange(struct message *m, const char *command, char *ret_answer, size_t size,
+                    struct gon_error *err)
+{
+    struct transport_stats *book = transport_book(m->t);
+    int rc = wait_gap(m, err);
+    if (rc == 0)
+        rc = transport_drain(m->t, 0, err);
+    if (rc < 0)
+        return rc;
+    book->garbled += rc > 0 && !m->stray;
+    m->stray = false;
+    rc = put(m, command, err);
+    if (rc < 0)
+        return rc;
+    book->queries++;
+    const int64_t sent_ns = clk_now_ns(transport_clk(m->t));
+    rc = take_answer(m, command, ret_answer, size, err);
+    if (rc == 0)
+        transport_latency(m->t, clk_now_ns(transport_clk(m->t)) - sent_ns);
+    return rc;
+}
+
+static int get_into_step(struct message *m, struct gon_error *err)
+{
+    const struct message_format *f = m->format;
+    char answer[COMMAND_MOST];
+    int rc = transport_drain(m->t, f->quiet_ns, err);
+    if (rc < 0)
+        return rc;
+    if (f->sync_query) {
+        rc = exchange(m, f->sync_query, answer, sizeof answer, err);
+        if (rc < 0)
+            return rc;
+        if (strncmp(answer, f->sync_begins, strlen(f->sync_begins)) != 0)
+            return garbled(m, f->sync_query, "not the answer that gets into step", m->have, err);
+    }
+    m->out_of_step = false;
+    return 0;
+}
+
+int message_query(struct message *m, const char *command, char *ret_answer, size_t size,
+                  struct gon_error *err)
+{
+    int rc = m->out_of_step ? get_into_step(m, err) : 0;
+    return rc < 0 ? rc : exchange(m, command, ret_answer, size, err);
+}
+
+int message_send(struct message *m, const char *command, struct gon_error *err)
+{
+    int rc = m->out_of_step ? get_into_step(m, err) : 0;
+    if (rc == 0)
+        rc = wait_gap(m, err);
+    return rc < 0 ? rc : put(m, command, err);
+}
+
+int message_reopen(struct message *m, struct gon_error *err)
+{
+    int rc = transport_reopen(m->t, err);
+    if (rc < 0)
+        return rc;
+    m->ready_ns = clk_now_ns(transport_clk(m->t));
+    m->out_of_step = true;
+    return 0;
+}
+
+// --- questions that may be repeated -------------------------------------------------------------------
+
+int message_ask(struct message *m, const char *command,
+                int (*read)(const char *answer, void *ctx, struct gon_error *err), void *ctx,
+                struct gon_error *err)
+{
+    char answer[COMMAND_MOST];
+    struct gon_error why = {0};
+    int rc = GON_E_LINK;
+    for (int i = 0; i < TRIES && rc == GON_E_LINK; i++) {
+        rc = message_query(m, command, answer, sizeof answer, &why);
+        if (rc == 0 && read(answer, ctx, &why)) {
+            rc = message_out_of_step(m, "not what was asked");
+            gon_fail(&why, rc, "%s: '%s' was answered '%.80s'", transport_link(m->t), command, answer);
+        }
+    }
+    return rc < 0 ? gon_fail(err, rc, "%s", why.text) : 0;
+}
+
+static int read_number(const char *answer, void *ctx, struct gon_error *err)
+{
+    return message_number(answer, ctx, err);
+}
+
+int message_ask_number(struct message *m, const char *command, double *ret_value, struct gon_error *err)
+{
+    return message_ask(m, command, read_number, ret_value, err);
+}
+
+struct text {
+    char *to;
+    size_t size;
+};
+
+static int read_text(const char *answer, void *ctx, struct gon_error *err)
+{
+    const struct text *text = ctx;
+    (void)err;
+    snprintf(text->to, text->size, "%s", answer);
+    return 0;
+}
+
+int message_ask_text(struct message *m, const char *command, char *ret_text, size_t size,
+                     struct gon_error *err)
+{
+    return message_ask(m, command, read_text, &(struct text){ret_text, size}, err);
+}
