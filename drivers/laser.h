@@ -35,10 +35,16 @@ struct laser_status {
 
 struct laser_ops {
     int (*identify)(struct laser *l, char *ret_text, size_t size, struct gon_error *err);
+    // Everything, asked now. Cobolt: 4 commands (5 with a fault, 1 more the first time), 0.1 s each.
     int (*status)(struct laser *l, struct laser_status *ret_status, struct gon_error *err);
+    // One command, 0.1 s at most: whether the laser says that light comes out.
+    int (*emission)(struct laser *l, bool *ret_emission, struct gon_error *err);
     int (*set_power)(struct laser *l, double power_w, struct gon_error *err); // read back
+    // GON_E_REFUSED: interlock open, key; GON_E_DEVICE: fault, or it answered that it does not want to.
     int (*on)(struct laser *l, struct gon_error *err);
-    int (*off)(struct laser *l, struct gon_error *err); // 0 only when read back
+    // 0 only when read back, and no start sequence goes on. Never minds the cancel token. GON_E_DEVICE:
+    // told 5 times and it still emits ("LASER MAY BE ON"). Cobolt: sent at once, confirmed 0.2 s later.
+    int (*off)(struct laser *l, struct gon_error *err);
     int (*reopen)(struct laser *l, struct gon_error *err);
     const char *(*fault_text)(int code);
     void (*free)(struct laser *l);
@@ -48,7 +54,11 @@ struct laser {
     const struct laser_ops *ops; // first member of each driver's own struct
 };
 
-// Opens the link. Cobolt 05 series: 100 ms between commands.
+// Cobolt 05-01 series (Rumba) over RS-232 or USB. Opens the link only and sends nothing: call off first,
+// then identify. The laser ignores a command that comes less than 100 ms after the one before; the gaps
+// are kept through the clock, which so gets its turn. Queries are repeated up to 3 times when the link
+// fails. on is "@cob1" (the sequence with temperatures and key) where autostart is enabled, else "l1":
+// the laser's own settings are not changed.
 int laser_cobolt_open(const char *link, struct clk *clk, const struct cancel *cancel,
                       struct laser **ret_laser, struct gon_error *err);
 
