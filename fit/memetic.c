@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-enum { GENES = 3, GENERATIONS = 8, POPULATION_MAX = 192, NICHES_MAX = 24, FINALISTS = 4, FULL = 3 };
+enum { GENES = 3, GENERATIONS = 6, POPULATION_MAX = 192, NICHES_MAX = 24, FINALISTS = 6, FULL = 3 };
 #define FIRST_STEPS 10  // of the polish of each niche
 #define LAST_STEPS 200  // of the finalists: a bound, not an expectation
 
@@ -181,12 +181,12 @@ static int polish_niches(struct search *s, struct fit_optimum *niche)
     return finalists;
 }
 
-// 64 individuals and 12 niches at 850 points; between 48 and 192, and 8 and 24.
+// 64 individuals and 16 niches at 850 points; between 48 and 192, and 8 and 24.
 static void size_search(struct search *s)
 {
     double scale = sqrt(850.0 / (double)s->set->count);
     s->population = (int)fmin(POPULATION_MAX, fmax(48, 64 * scale)) / 2 * 2;
-    s->niches = (int)fmin(NICHES_MAX, fmax(8, 12 * scale));
+    s->niches = (int)fmin(NICHES_MAX, fmax(8, 16 * scale));
 }
 
 static bool search_set(struct search *s, const struct fit_options *o, struct fit_optimum *niche,

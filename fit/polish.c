@@ -6,14 +6,16 @@
 
 #include <string.h>
 
-enum { NONLINEAR = 3 }; // FIT_N, FIT_K, FIT_SIGMA come first in every array
+enum { N = FIT_PARAMS, NONLINEAR = 3 }; // FIT_N, FIT_K, FIT_SIGMA come first in every array
 #define DONE 1e-11
 
-// Where the polish stands: the reduced problem in the nonlinear coordinates.
+// Where the polish stands. ks and kd are the best for its n, k, sigma; they take part in the step because
+// near their bounds it must know that they cannot follow. Inside, it is the projected step exactly.
 struct state {
     struct fit_optimum at;
-    double s[NONLINEAR][NONLINEAR]; // Gauss-Newton matrix with ks and kd projected out
-    double g[NONLINEAR];            // downhill: minus half the gradient of q
+    double s[N][N]; // J^T J
+    double g[N];    // J^T r: downhill
+    double damp[N]; // Marquardt's scaling: the diagonal of S with ks and kd projected out, 0 for these
 };
 
 static double clamp(double v, double low, double high)
@@ -21,19 +23,20 @@ static double clamp(double v, double low, double high)
     return v < low ? low : v > high ? high : v;
 }
 
-// Removes from c = <u, w> what the free linear columns explain: u and w given by their products with a, b.
-static double project(const struct kernel_gram *gram, const struct varpro *v, const double u[2],
-                      const double w[2])
+// What of <u, u> is left when the free ones of ks and kd follow: u given by its products with a, b and u.
+static double left_over(const struct kernel_gram *gram, const struct varpro *v, const double *u,
+                        double uu)
 {
     double aa = gram->m[KERNEL_A][KERNEL_A], ab = gram->m[KERNEL_A][KERNEL_B];
     double bb = gram->m[KERNEL_B][KERNEL_B], det = aa * bb - ab * ab;
+    double ua = u[KERNEL_A], ub = u[KERNEL_B], explained = 0;
     if (v->ks_free && v->kd_free && det > 1e-14 * aa * bb)
-        return (u[0] * (bb * w[0] - ab * w[1]) + u[1] * (aa * w[1] - ab * w[0])) / det;
-    if (v->ks_free && aa > 0)
-        return u[0] * w[0] / aa;
-    if (v->kd_free && bb > 0)
-        return u[1] * w[1] / bb;
-    return 0;
+        explained = (ua * (bb * ua - ab * ub) + ub * (aa * ub - ab * ua)) / det;
+    else if (v->ks_free && aa > 0)
+        explained = ua * ua / aa;
+    else if (v->kd_free && bb > 0)
+        explained = ub * ub / bb;
+    return fmax(uu - explained, 1e-12 * uu);
 }
 
 // One pass at x, whose ks and kd are only where residuals are taken; false when canceled.
@@ -44,15 +47,16 @@ static bool evaluate(const struct fit_set *set, const struct fit_space *space,
     if (!kernel_gram(set, x, control, &gram))
         return false;
     struct varpro v = varpro_solve(&gram, x, space);
-    const double (*m)[KERNEL_COLUMNS] = gram.m;
+    static const enum kernel_column column[N] = {KERNEL_DN, KERNEL_DKAPPA, KERNEL_DSIGMA, KERNEL_A,
+                                                 KERNEL_B};
+    const double scale[N] = {v.ks, v.ks, v.ks, 1, 1};
     double ds = v.ks - x[FIT_KS], dd = v.kd - x[FIT_KD];
-    for (int i = 0; i < NONLINEAR; i++) {
-        double u[2] = {m[i][KERNEL_A], m[i][KERNEL_B]};
-        ret->g[i] = v.ks * (m[i][KERNEL_R] - ds * u[0] - dd * u[1]);
-        for (int j = 0; j < NONLINEAR; j++) {
-            double w[2] = {m[j][KERNEL_A], m[j][KERNEL_B]};
-            ret->s[i][j] = v.ks * v.ks * (m[i][j] - project(&gram, &v, u, w));
-        }
+    for (int i = 0; i < N; i++) {
+        const double *m = gram.m[column[i]];
+        ret->g[i] = scale[i] * (m[KERNEL_R] - ds * m[KERNEL_A] - dd * m[KERNEL_B]);
+        for (int j = 0; j < N; j++)
+            ret->s[i][j] = scale[i] * scale[j] * m[column[j]];
+        ret->damp[i] = i < NONLINEAR ? scale[i] * scale[i] * left_over(&gram, &v, m, m[column[i]]) : 0;
     }
     memcpy(ret->at.x, x, sizeof ret->at.x);
     ret->at.x[FIT_KS] = v.ks;
@@ -61,16 +65,16 @@ static bool evaluate(const struct fit_set *set, const struct fit_space *space,
     return true;
 }
 
-// Solves (S + lambda diag S) d = rhs over the coordinates in use, by Cholesky; false when not positive.
-static bool solve(const struct state *st, double lambda, const bool use[NONLINEAR],
-                  const double rhs[NONLINEAR], double d[NONLINEAR])
+// Solves (S + lambda damp) d = rhs over the coordinates in use, by Cholesky; false when not positive.
+static bool solve(const struct state *st, double lambda, const bool use[N],
+                  const double rhs[N], double d[N])
 {
-    double l[NONLINEAR][NONLINEAR] = {{0}}, y[NONLINEAR];
-    for (int i = 0; i < NONLINEAR; i++) {
+    double l[N][N] = {{0}}, y[N];
+    for (int i = 0; i < N; i++) {
         for (int j = 0; j <= i; j++) {
             double sum = use[i] && use[j] ? st->s[i][j] : 0;
             if (i == j)
-                sum = use[i] ? sum * (1 + lambda) : 1;
+                sum = use[i] ? sum + lambda * st->damp[i] : 1;
             for (int k = 0; k < j; k++)
                 sum -= l[i][k] * l[j][k];
             if (i == j && !(sum > 0))
@@ -82,8 +86,8 @@ static bool solve(const struct state *st, double lambda, const bool use[NONLINEA
             y[i] -= l[i][k] * y[k];
         y[i] /= l[i][i];
     }
-    for (int i = NONLINEAR - 1; i >= 0; i--) {
-        for (int k = i + 1; k < NONLINEAR; k++)
+    for (int i = N - 1; i >= 0; i--) {
+        for (int k = i + 1; k < N; k++)
             y[i] -= l[k][i] * y[k];
         y[i] /= l[i][i];
         d[i] = use[i] ? y[i] : 0;
@@ -94,41 +98,43 @@ static bool solve(const struct state *st, double lambda, const bool use[NONLINEA
 // The damped step within the bounds: a coordinate that would leave goes to its bound and the others are
 // solved again; one that sits on its bound and would leave stays.
 static bool bounded_step(const struct state *st, const struct fit_space *space, double lambda,
-                         double d[NONLINEAR])
+                         double d[N], bool *ret_clipped)
 {
-    bool use[NONLINEAR];
-    double rhs[NONLINEAR], held[NONLINEAR] = {0};
-    for (int i = 0; i < NONLINEAR; i++) {
+    bool use[N];
+    *ret_clipped = false;
+    double rhs[N], held[N] = {0};
+    for (int i = 0; i < N; i++) {
         double x = st->at.x[i];
         use[i] = st->s[i][i] > 0 && space->lower[i] < space->upper[i] &&
                  !(x <= space->lower[i] && st->g[i] < 0) && !(x >= space->upper[i] && st->g[i] > 0);
         rhs[i] = st->g[i];
     }
-    for (int round = 0; round <= NONLINEAR; round++) {
+    for (int round = 0; round <= N; round++) {
         if (!solve(st, lambda, use, rhs, d))
             return false;
         int out = -1;
-        for (int i = 0; i < NONLINEAR && out < 0; i++)
+        for (int i = 0; i < N && out < 0; i++)
             if (use[i] && (st->at.x[i] + d[i] < space->lower[i] || st->at.x[i] + d[i] > space->upper[i]))
                 out = i;
-        for (int i = 0; i < NONLINEAR; i++)
+        for (int i = 0; i < N; i++)
             d[i] = use[i] ? d[i] : held[i];
         if (out < 0)
             return true;
+        *ret_clipped = true;
         use[out] = false;
         held[out] = (d[out] < 0 ? space->lower[out] : space->upper[out]) - st->at.x[out];
-        for (int i = 0; i < NONLINEAR; i++)
+        for (int i = 0; i < N; i++)
             rhs[i] -= st->s[i][out] * held[out];
     }
     return true;
 }
 
-static double predicted_gain(const struct state *st, const double d[NONLINEAR])
+static double predicted_gain(const struct state *st, const double d[N])
 {
     double gain = 0;
-    for (int i = 0; i < NONLINEAR; i++) {
+    for (int i = 0; i < N; i++) {
         gain += 2 * st->g[i] * d[i];
-        for (int j = 0; j < NONLINEAR; j++)
+        for (int j = 0; j < N; j++)
             gain -= d[i] * st->s[i][j] * d[j];
     }
     return gain;
@@ -144,12 +150,17 @@ bool polish(const struct fit_set *set, const struct fit_space *space, int max_st
         return false;
     double lambda = 1e-3;
     for (int step = 0; step < max_steps && lambda < 1e9; step++) {
-        double d[NONLINEAR];
-        if (!bounded_step(&now, space, lambda, d)) {
+        double d[N];
+        bool clipped;
+        if (!bounded_step(&now, space, lambda, d, &clipped)) {
             lambda *= 10;
             continue;
         }
         double gain = predicted_gain(&now, d);
+        if (clipped && !(gain > DONE * now.at.q)) { // the bound, not convergence
+            lambda *= 10;
+            continue;
+        }
         if (!(gain > DONE * now.at.q))
             break;
         double x[FIT_PARAMS];
