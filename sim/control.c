@@ -325,7 +325,7 @@ char *control_answer(const struct control *c, const char *line, int64_t t_ns)
         json_object_set_new(r.out, "error", json_string(r.error));
     }
     json_object_set_new(r.out, "ok", json_boolean(!*r.error));
-    char *text = json_dumps(r.out, JSON_COMPACT);
+    char *text = json_dumps(r.out, JSON_COMPACT | JSON_REAL_PRECISION(12));
     char *answer = NULL;
     if (text && asprintf(&answer, "%s\n", text) < 0)
         answer = NULL;

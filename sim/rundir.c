@@ -21,7 +21,7 @@ void rundir_path(const struct rundir *r, const char *name, char *ret_path, size_
 // Only one goniosim; whoever has the lock also wrote its process id.
 static int lock(struct rundir *r, struct gon_error *err)
 {
-    char path[128], text[32] = "";
+    char path[RUNDIR_FILE], text[32] = "";
     rundir_path(r, "goniosim.pid", path, sizeof path);
     r->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
     if (r->lock_fd < 0)
@@ -43,7 +43,7 @@ static int lock(struct rundir *r, struct gon_error *err)
 int rundir_open(struct rundir *r, const char *path, struct gon_error *err)
 {
     char full[PATH_MAX];
-    *r = (struct rundir){.lock_fd = -1};
+    *r = (struct rundir){.lock_fd = -1, .dir_fd = -1};
     if (mkdir(path, 0700) == 0)
         r->made = true;
     else if (errno != EEXIST)
@@ -54,12 +54,13 @@ int rundir_open(struct rundir *r, const char *path, struct gon_error *err)
         return gon_fail(err, GON_E_INPUT, "run directory %s: its path has more than %zu characters", full,
                         sizeof r->path - 1);
     strcpy(r->path, full);
+    r->dir_fd = open(full, O_PATH | O_DIRECTORY | O_CLOEXEC);
     return lock(r, err);
 }
 
 void rundir_close(struct rundir *r)
 {
-    char path[128];
+    char path[RUNDIR_FILE];
     if (r->lock_fd < 0)
         return;
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
@@ -68,6 +69,7 @@ void rundir_close(struct rundir *r)
     }
     if (r->made)
         rmdir(r->path);
+    close(r->dir_fd);
     close(r->lock_fd);
     r->lock_fd = -1;
 }
@@ -75,7 +77,7 @@ void rundir_close(struct rundir *r)
 int rundir_write(const struct rundir *r, const char *name, void (*write)(FILE *out, const void *ctx),
                  const void *ctx, struct gon_error *err)
 {
-    char path[128], draft[136];
+    char path[RUNDIR_FILE], draft[RUNDIR_FILE + 8];
     rundir_path(r, name, path, sizeof path);
     snprintf(draft, sizeof draft, "%s.new", path);
     FILE *out = fopen(draft, "we");

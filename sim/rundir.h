@@ -8,15 +8,17 @@
 #include <stdbool.h>
 #include <stdio.h>
 
+enum { RUNDIR_PATH = 512, RUNDIR_FILE = RUNDIR_PATH + 32 };
+
 struct rundir {
-    char path[80]; // absolute; a socket's address must fit behind it
-    int lock_fd;
+    char path[RUNDIR_PATH]; // absolute
+    int lock_fd, dir_fd;
     bool made;
 };
 
 int rundir_open(struct rundir *r, const char *path, struct gon_error *err);
 void rundir_close(struct rundir *r);
-// path/name into ret_path.
+// path/name into ret_path, of RUNDIR_FILE bytes to be enough.
 void rundir_path(const struct rundir *r, const char *name, char *ret_path, size_t size);
 int rundir_write(const struct rundir *r, const char *name, void (*write)(FILE *out, const void *ctx),
                  const void *ctx, struct gon_error *err);

@@ -42,7 +42,7 @@ static int open_wires(struct server *s, struct gon_error *err)
 {
     for (int i = 0; i < BENCH_PORTS; i++) {
         struct wire *w = &s->wire[i];
-        char path[128];
+        char path[RUNDIR_FILE];
         rundir_path(&s->dir, bench_port_names[i], path, sizeof path);
         if (i % 2)
             wire_tcp_init(w, bench_port_names[i], bench_port(&s->bench, (enum bench_port)i));
@@ -60,11 +60,12 @@ static int open_wires(struct server *s, struct gon_error *err)
 static int open_control(struct server *s, struct gon_error *err)
 {
     struct sockaddr_un a = {.sun_family = AF_UNIX};
-    rundir_path(&s->dir, "control.sock", a.sun_path, sizeof a.sun_path);
+    // Through /proc, because a socket's address holds 107 bytes and a path may be longer.
+    snprintf(a.sun_path, sizeof a.sun_path, "/proc/self/fd/%d/control.sock", s->dir.dir_fd);
     unlink(a.sun_path); // of one that was killed: this one has the lock
     s->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (s->listen_fd < 0 || bind(s->listen_fd, (struct sockaddr *)&a, sizeof a) || listen(s->listen_fd, CLIENTS))
-        return gon_fail(err, GON_E_SYSTEM, "%s: %s", a.sun_path, strerror(errno));
+        return gon_fail(err, GON_E_SYSTEM, "%s/control.sock: %s", s->dir.path, strerror(errno));
     return 0;
 }
 
@@ -84,7 +85,7 @@ static int open_signals(struct server *s, struct gon_error *err)
 static void write_serial(FILE *out, const void *ctx)
 {
     const struct server *s = ctx;
-    char axes[200], laser[200], detector[200];
+    char axes[700], laser[700], detector[700];
     snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", s->wire[BENCH_AXES].address, s->config.axes_baud);
     snprintf(laser, sizeof laser, "serial:%s?baud=%d", s->wire[BENCH_LASER].address, s->config.laser_baud);
     snprintf(detector, sizeof detector, "serial:%s?baud=%d", s->wire[BENCH_DETECTOR].address,
@@ -95,7 +96,7 @@ static void write_serial(FILE *out, const void *ctx)
 static void write_tcp(FILE *out, const void *ctx)
 {
     const struct server *s = ctx;
-    char axes[200], laser[200], detector[200];
+    char axes[700], laser[700], detector[700];
     snprintf(axes, sizeof axes, "modbus-tcp:%s", s->wire[BENCH_AXES_TCP].address);
     snprintf(laser, sizeof laser, "tcp:%s", s->wire[BENCH_LASER_TCP].address);
     snprintf(detector, sizeof detector, "tcp:%s", s->wire[BENCH_DETECTOR_TCP].address);
@@ -127,7 +128,7 @@ int server_open(const struct sim_config *config, const char *run_dir, struct ser
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
     s->config = *config;
     s->control = (struct control){.bench = &s->bench, .wires = s->wire};
-    s->signal_fd = s->listen_fd = s->dir.lock_fd = -1;
+    s->signal_fd = s->listen_fd = s->dir.lock_fd = s->dir.dir_fd = -1;
     for (int i = 0; i < CLIENTS; i++)
         s->client[i].fd = -1;
     bench_init(&s->bench, &config->bench, clk_now_ns(clk_system()));

@@ -35,7 +35,7 @@ struct wire {
     bool enforce;           // baud timing
     int bits;               // of a character on the line
     uint64_t clients, bytes_in, bytes_out;
-    char address[128];      // pty: its symlink; TCP: "127.0.0.1:port"
+    char address[600];      // pty: its symlink; TCP: "127.0.0.1:port"
     // bytes on the line towards the instrument, and back
     uint8_t rx[WIRE_BUFFER], tx[WIRE_BUFFER];
     size_t rx_size, tx_size;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // A serial line as a pty. While no client has the slave open the master reports POLLHUP without end, so
 // that it is not polled then; inotify on the slave says when somebody opens it. After the last close
-// the line settings go back to what they were: C libraries report failure for a tcsetattr that changes
-// nothing, and the parity that ptys cannot have would be such a change for the next client.
+// the line settings go back to what they were: the C library reports EINVAL for a tcsetattr that asks
+// for parity (which ptys cannot have) and changes no input, output or local flag. So these settings are
+// raw but for two flags that do nothing here and that every serial client clears.
 #include "sim/wire.h"
 
 #include <errno.h>
@@ -16,13 +17,14 @@
 
 enum { MASTER, WATCH };
 
-// Raw and silent, at a baud nobody asks for.
 static void pristine(int master)
 {
     struct termios t;
     if (tcgetattr(master, &t))
         return;
     cfmakeraw(&t);
+    t.c_oflag |= OPOST;
+    t.c_lflag |= IEXTEN;
     cfsetspeed(&t, B134);
     tcsetattr(master, TCSANOW, &t);
 }
@@ -30,7 +32,7 @@ static void pristine(int master)
 // The link appears, or changes where it points, in one step.
 static int publish(const char *target, const char *path, struct gon_error *err)
 {
-    char draft[160];
+    char draft[610];
     snprintf(draft, sizeof draft, "%s.new", path);
     unlink(draft);
     if (symlink(target, draft) || rename(draft, path))
