@@ -47,11 +47,15 @@ void acquire_begin(struct acquire *a)
 static int change_range(struct instrument *in, struct acquire *a, struct gon_error *err)
 {
     const int ranges = instrument_ranges(in);
+    int rc = a->set_up ? instrument_set_up(in, err) : 0;
+    if (rc < 0)
+        return rc;
+    a->set_up = false;
     if (a->range < 0 || a->range >= ranges)
         a->range = ranges - 1;
     if (instrument_range(in) == a->range)
         return 0;
-    int rc = instrument_set_range(in, a->range, err);
+    rc = instrument_set_range(in, a->range, err);
     a->range_ns = instrument_now_ns(in);
     return rc;
 }
@@ -183,6 +187,7 @@ static void judge(struct instrument *in, struct acquire *a, struct acquire_readi
         r->again = false; // the laser has to be looked at first
     } else if (r->flags & (STORE_UNLOCKED | STORE_UNSETTLED)) {
         r->again = true;
+        a->set_up = (r->flags & STORE_UNSETTLED) != 0; // somebody changed it, or it restarted
     } else {
         r->accepted = true;
         if (r->range > a->least_range &&

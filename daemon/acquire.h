@@ -24,6 +24,7 @@ struct acquire {
     int range;            // of the next attempt; -1: the least sensitive
     int least_range;      // at this point anything more sensitive saturated
     int ups;              // ranges gone up at this point: the steps double
+    bool set_up;          // its settings are to be written again first
     int64_t range_ns;     // when the range was last changed
     double last_signal_v; // of the reading before, for the settling; 0: none
 };

@@ -18,7 +18,7 @@
 
 #define ATTEMPTS_MORE 3           // attempts at a point: the ranges and these
 #define RETURNS_MOST 5            // pauses that ended by themselves, without a reading between them
-#define LASER_LOOK_NS CLK_S(2)    // how often the laser itself is asked while it is on
+#define LASER_LOOK_NS CLK_S(1)    // how often the laser itself is asked while it is on
 #define EMITTING_LEAST_S 600.0    // how long a laser may take to reach its set-point, at least
 #define OFF_AT_FIRST_S 5.0        // and to leave "off" after it accepted ON
 #define STEADY_REL 0.005          // change of the monitor in a second, to call it steady
@@ -353,6 +353,17 @@ static int check_laser(struct engine *e)
     return rc;
 }
 
+// The same with one short question, and only when it is due.
+static int watch_laser(struct engine *e)
+{
+    bool on;
+    if (!e->lit || clk_now_ns(e->ports->clk) < e->laser_look_ns)
+        return 0;
+    int rc = instrument_light(e->in, &on, &e->why);
+    e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
+    return rc < 0 || on ? rc : check_laser(e);
+}
+
 static int operator_paused(struct engine *e)
 {
     return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
@@ -583,8 +594,8 @@ static int do_point(struct engine *e)
     int rc = prepare(e);
     if (rc >= 0)
         rc = light_for(e);
-    if (rc >= 0 && e->lit && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
-        rc = check_laser(e);
+    if (rc >= 0)
+        rc = watch_laser(e);
     if (rc >= 0)
         rc = go_to(e, &at);
     if (rc < 0)

@@ -196,7 +196,7 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = laser_cobolt_open(in->bench->laser.link, &in->breathing.clk, NULL, &laser, err);
+    int rc = laser_cobolt_open(p->address, &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
@@ -204,22 +204,22 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     return safety_begin(in->safety, p->identity, sizeof p->identity, err);
 }
 
+static int set_up_detector(struct instrument *in, struct gon_error *err)
+{
+    const struct bench_detector *c = &in->bench->detector;
+    const struct detector_setup setup = {c->time_constant_s, c->slope_db, c->monitor_aux};
+    in->range = -1;
+    return in->detector->ops->setup(in->detector, &setup, &in->time_constant_s, err);
+}
+
 static int connect_detector(struct instrument *in, struct gon_error *err)
 {
-    const struct bench_detector *config = &in->bench->detector;
     struct part_state *p = &in->part[PART_DETECTOR];
-    int rc = 0;
-    if (!in->detector)
-        rc = detector_sr830_open(config->link, &in->breathing.clk, NULL, &in->detector, err);
-    else
-        rc = in->detector->ops->reopen(in->detector, err);
+    int rc = in->detector ? in->detector->ops->reopen(in->detector, err)
+                          : detector_sr830_open(p->address, &in->breathing.clk, NULL, &in->detector, err);
     if (rc >= 0)
         rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
-    const struct detector_setup setup = {config->time_constant_s, config->slope_db, config->monitor_aux};
-    in->range = -1;
-    if (rc >= 0)
-        rc = in->detector->ops->setup(in->detector, &setup, &in->time_constant_s, err);
-    return rc;
+    return rc < 0 ? rc : set_up_detector(in, err);
 }
 
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err)
@@ -545,6 +545,18 @@ int instrument_laser(struct instrument *in, struct laser_status *ret_status, str
     return rc;
 }
 
+int instrument_light(struct instrument *in, bool *ret_emission, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_LASER, err);
+    if (rc >= 0)
+        rc = note(in, PART_LASER, safety_look(in->safety, &in->laser.emission, err), err);
+    if (rc >= 0)
+        *ret_emission = in->laser.emission;
+    return rc;
+}
+
 int instrument_power(struct instrument *in, double power_w, struct gon_error *err)
 {
     struct gon_error own;
@@ -605,6 +617,14 @@ double instrument_full_scale_v(const struct instrument *in, int range)
 int instrument_range(const struct instrument *in)
 {
     return in->range;
+}
+
+int instrument_set_up(struct instrument *in, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = need(in, PART_DETECTOR, err);
+    return rc < 0 ? rc : note(in, PART_DETECTOR, set_up_detector(in, err), err);
 }
 
 int instrument_set_range(struct instrument *in, int range, struct gon_error *err)

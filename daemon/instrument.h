@@ -130,6 +130,8 @@ double instrument_rounded(const struct instrument *in, enum instrument_part part
 
 // --- laser: as safety.h, with the part's link kept ------------------------------------------------
 int instrument_laser(struct instrument *in, struct laser_status *ret_status, struct gon_error *err);
+// One short question: whether it says that light comes out.
+int instrument_light(struct instrument *in, bool *ret_emission, struct gon_error *err);
 int instrument_power(struct instrument *in, double power_w, struct gon_error *err);
 int instrument_emission_on(struct instrument *in, struct gon_error *err);
 int instrument_emission_off(struct instrument *in, struct gon_error *err);
@@ -141,6 +143,8 @@ const struct safety *instrument_safety(const struct instrument *in);
 int instrument_ranges(const struct instrument *in);
 double instrument_full_scale_v(const struct instrument *in, int range);
 int instrument_range(const struct instrument *in); // -1: not known
+// The configured time constant and slope, written and read back; the range is not known afterwards.
+int instrument_set_up(struct instrument *in, struct gon_error *err);
 int instrument_set_range(struct instrument *in, int range, struct gon_error *err);
 int instrument_sample(struct instrument *in, struct detector_sample *ret_sample, struct gon_error *err);
 int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err);

@@ -2,6 +2,7 @@
 #include "daemon/safety.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 struct safety {
     struct laser *laser;
@@ -113,7 +114,7 @@ int safety_off(struct safety *s, struct gon_error *err)
         clk_sleep(s->clk, CLK_MS(100), NULL);
     }
     // Before the first ON there is only a link that fails; afterwards light may come out.
-    if (s->emission || rc == GON_E_DEVICE)
+    if ((s->emission || rc == GON_E_DEVICE) && !strstr(why.text, "LASER MAY BE ON"))
         return gon_fail(err, rc, "LASER MAY BE ON: use its key or the interlock (%s)", why.text);
     return gon_fail(err, rc, "%s", why.text);
 }
@@ -129,6 +130,11 @@ void safety_tick(struct safety *s)
 int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_error *err)
 {
     return s->laser->ops->status(s->laser, ret_status, err);
+}
+
+int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err)
+{
+    return s->laser->ops->emission(s->laser, ret_emission, err);
 }
 
 const char *safety_fault_text(const struct safety *s, int code)

@@ -42,6 +42,8 @@ int safety_off(struct safety *s, struct gon_error *err);
 void safety_tick(struct safety *s); // renews the lease; costs nothing while emission is off
 
 int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_error *err);
+// One short question: whether the laser says that light comes out.
+int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err);
 const char *safety_fault_text(const struct safety *s, int code);
 
 bool safety_emission(const struct safety *s);         // on was sent and off was not read back since

@@ -52,6 +52,8 @@ struct simbench {
     // what a test wants to know
     bool emitting_last;
     int ons, offs;
+    bool unsettled; // somebody touched the detector's panel
+    int setups;
     int nonsense; // detector answers that are not numbers, to come
 };
 
@@ -225,6 +227,16 @@ static inline int simbench_laser_status(struct laser *l, struct laser_status *re
     return 0;
 }
 
+static inline int simbench_laser_emission(struct laser *l, bool *ret, struct gon_error *err)
+{
+    struct simbench *b = simbench_of_laser(l);
+    bool done;
+    int rc = simbench_call(b, SIMBENCH_LASER, &done, err);
+    if (rc >= 0)
+        *ret = sim_laser_emits(&b->world.laser);
+    return rc;
+}
+
 static inline int simbench_laser_power(struct laser *l, double power_w, struct gon_error *err)
 {
     struct simbench *b = simbench_of_laser(l);
@@ -302,6 +314,7 @@ static inline int simbench_detector_setup(struct detector *d, const struct detec
     int rc = simbench_call(b, SIMBENCH_DETECTOR, &done, err);
     if (rc < 0)
         return rc;
+    b->setups++;
     b->world.lockin.time_constant_s = s->time_constant_s;
     b->world.lockin.poles = s->slope_db / 6;
     *ret_time_constant_s = s->time_constant_s;
@@ -357,7 +370,10 @@ static inline int simbench_detector_condition(struct detector *d, unsigned *ret,
     if (rc < 0)
         return rc;
     const unsigned c = b->world.lockin.condition;
-    *ret = (c & 7 ? (unsigned)DETECTOR_SATURATED : 0) | (c & LOCKIN_UNLOCKED ? (unsigned)DETECTOR_UNLOCKED : 0);
+    *ret = (c & 7 ? (unsigned)DETECTOR_SATURATED : 0) |
+           (c & LOCKIN_UNLOCKED ? (unsigned)DETECTOR_UNLOCKED : 0) |
+           (b->unsettled ? (unsigned)DETECTOR_UNSETTLED : 0);
+    b->unsettled = false;
     b->world.lockin.condition = 0;
     return 0;
 }
@@ -381,7 +397,7 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
         simbench_axis_home,     simbench_axis_reset,  simbench_alarm_text, simbench_axis_free};
     static const struct laser_ops laser_ops = {
         .identify = simbench_laser_identify, .status = simbench_laser_status,
-        .set_power = simbench_laser_power,   .on = simbench_laser_on,
+        .emission = simbench_laser_emission, .set_power = simbench_laser_power,   .on = simbench_laser_on,
         .off = simbench_laser_off,           .reopen = simbench_laser_reopen,
         .fault_text = simbench_fault_text,   .free = simbench_laser_free};
     static const struct detector_ops detector_ops = {

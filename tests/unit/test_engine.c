@@ -370,7 +370,7 @@ static void compare(const struct run *r, double *ret_worst, double *ret_rms)
         const double u = truth * hypot(2e-4, noise_v / row->signal_v);
         worst = fmax(worst, fabs(f - truth) / u);
         squares += (f - truth) * (f - truth) / (u * u);
-        assert_float_equal(r->f_per_sr[i], f, 1e-3 * truth); // what was published meanwhile
+        assert_true(fabs(r->f_per_sr[i] - f) < 1e-3 * truth); // what was published meanwhile
         n++;
     }
     assert_true(n > 0);
@@ -431,11 +431,18 @@ static void a_point_on_a_fast_bench_costs_40_ms(void **state)
     const int64_t start_ns = r->b.clk.t_ns;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    const double ms = (double)(r->b.clk.t_ns - start_ns) * 1e-6 / r->plan.count;
+    const double all_s = (double)(r->b.clk.t_ns - start_ns) * 1e-9;
+    double ms = 0;
+    int n = 0;
+    for (int i = 1; i < r->rows; i++) // within the sweeps: without the ways back
+        if (r->row[i].sweep == r->row[i - 1].sweep && r->row[i].sweep >= 1 && r->row[i].sweep <= 10) {
+            ms += (double)(r->row[i].t_utc_ms - r->row[i - 1].t_utc_ms);
+            n++;
+        }
     compare(r, &worst, &rms);
-    print_message("%.1f ms a point, %ld calls, %d rows, worst %.2g, rms %.2g\n", ms, r->b.calls, r->rows,
-                  worst, rms);
-    assert_true(ms < 52); // of which 12 are homing, warm-up and the references
+    print_message("%.1f ms a reading, %.1f s in all, %ld calls, %d rows, worst %.2g, rms %.2g\n", ms / n,
+                  all_s, r->b.calls, r->rows, worst, rms);
+    assert_true(ms / n < 40);
     assert_true(rms < 1.3);
     assert_true(worst < 5.0);
     end(r);
