@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // run and watch: a campaign given to the daemon, and its progress until it ends.
+#include "campaign/config.h"
 #include "cli/check.h"
 #include "cli/client.h"
 #include "cli/follow.h"
@@ -7,7 +8,6 @@
 #include "cli/remote.h"
 #include "cli/verb.h"
 
-#include <inttypes.h>
 #include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +52,8 @@ static int run_run(const struct verb *verb, int argc, char **argv)
     char *text = NULL;
     if (verb_take(verb, argc, argv, &o, &file, 1, 1) < 0)
         return EXIT_INPUT;
-    int status = check_campaign(file, &text);
+    struct campaign_config config;
+    int status = check_campaign(file, &config, &text);
     json_t *body = status ? NULL : json_pack("{s:s, s:s}", "config", text, "name", file);
     json_t *reply = body ? remote_call(&o.remote, "POST", "/api/v1/runs", body, &status) : NULL;
     free(text);

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// check: validates a campaign, bench or simulator file and prints their tables of settings.
+#include "cli/check.h"
+
+#include "campaign/bench.h"
+#include "campaign/config.h"
+#include "cli/out.h"
+#include "cli/verb.h"
+
+#include <jansson.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct options {
+    bool json;
+    const char *settings;
+};
+
+static const struct option_row rows[] = {
+    {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print {\"file\", \"kind\", \"errors\": [...]}"},
+    {"--settings", OPTION_TEXT, offsetof(struct options, settings), "KIND", 0, 0,
+     "print all settings of campaign or bench files as manual text"},
+    VERB_OPTIONS_END,
+};
+
+struct complaints {
+    json_t *list; // NULL: said at once on stderr
+    int count;
+};
+
+static void complain(void *ctx, const char *line)
+{
+    struct complaints *c = ctx;
+    c->count++;
+    if (c->list)
+        json_array_append_new(c->list, json_string(line));
+    else
+        fprintf(stderr, "%s\n", line);
+}
+
+static void say_count(int count, const char *what)
+{
+    fprintf(stderr, "%d %s, %s\n", count, count == 1 ? "error" : "errors", what);
+}
+
+int check_campaign(const char *path, struct campaign_config *ret_config, char **ret_text)
+{
+    struct complaints c = {NULL, 0};
+    if (campaign_config_load(path, (struct cfg_sink){complain, &c}, ret_config, ret_text) == 0)
+        return EXIT_OK;
+    say_count(c.count, "nothing started.");
+    return EXIT_INPUT;
+}
+
+int check_bench(const char *path, struct bench_config *ret_bench)
+{
+    struct complaints c = {NULL, 0};
+    if (bench_config_load(path, (struct cfg_sink){complain, &c}, ret_bench, NULL) == 0)
+        return EXIT_OK;
+    say_count(c.count, "nothing started.");
+    return EXIT_INPUT;
+}
+
+// A campaign file has a group "campaign", a bench file one "bench".
+static bool has_group(const char *text, const char *name)
+{
+    size_t n = strlen(name);
+    for (const char *at = text; (at = strstr(at, name)); at += n) {
+        const char *line = at;
+        while (line > text && (line[-1] == ' ' || line[-1] == '\t'))
+            line--;
+        const char *rest = at + n + strspn(at + n, " \t\r\n");
+        if ((line == text || line[-1] == '\n') && (*rest == ':' || *rest == '='))
+            return true;
+    }
+    return false;
+}
+
+static void quiet(void *ctx, const char *line)
+{
+    (void)ctx;
+    (void)line;
+}
+
+static const char *kind_of(const char *path)
+{
+    struct cfg_file *f = cfg_open(path, (struct cfg_sink){quiet, NULL});
+    const char *text = f ? cfg_text(f) : "";
+    const char *kind = has_group(text, "campaign") ? "campaign" : has_group(text, "bench") ? "bench" : NULL;
+    if (!kind)
+        kind = strstr(path, "goniod") || strstr(path, "bench") ? "bench" : "campaign";
+    cfg_close(f);
+    return kind;
+}
+
+static int print_settings(const char *kind)
+{
+    if (!strcmp(kind, "campaign"))
+        cfg_describe(stdout, campaign_config_schema);
+    else if (!strcmp(kind, "bench"))
+        cfg_describe(stdout, bench_config_schema);
+    else {
+        out_say("check: --settings %s: allowed: campaign, bench", kind);
+        return EXIT_INPUT;
+    }
+    return EXIT_OK;
+}
+
+static int run_check(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    const char *path;
+    int count = verb_take(verb, argc, argv, &o, &path, 0, 1);
+    if (count < 0)
+        return EXIT_INPUT;
+    if (o.settings)
+        return print_settings(o.settings);
+    if (count == 0) {
+        out_say("check: needs %s; see: gonio help check", verb->operands);
+        return EXIT_INPUT;
+    }
+    const char *kind = kind_of(path);
+    struct complaints c = {o.json ? json_array() : NULL, 0};
+    struct cfg_sink sink = {complain, &c};
+    struct campaign_config *campaign = malloc(sizeof *campaign);
+    struct bench_config *bench = malloc(sizeof *bench);
+    int rc = !campaign || !bench                 ? GON_E_SYSTEM
+             : !strcmp(kind, "campaign") ? campaign_config_load(path, sink, campaign, NULL)
+                                                 : bench_config_load(path, sink, bench, NULL);
+    free(campaign);
+    free(bench);
+    if (o.json) {
+        json_t *report = json_pack("{s:s, s:s, s:o}", "file", path, "kind", kind, "errors", c.list);
+        out_json(report);
+        json_decref(report);
+    } else if (rc < 0) {
+        say_count(c.count, "mend them and check again.");
+    } else {
+        fprintf(stderr, "%s: a good %s file\n", path, kind);
+    }
+    return rc < 0 ? EXIT_INPUT : EXIT_OK;
+}
+
+const struct verb verb_check = {
+    "check", "FILE.cfg", "validate a campaign or bench file, nothing else",
+    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen from its\n"
+    "groups. A campaign's meaning, with its estimated time: gonio plan FILE.cfg\n",
+    rows, run_check};

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// fit: the model's parameters from a CSV or a campaign file. Works without the daemon.
+#include "campaign/catalog.h"
+#include "campaign/dataset.h"
+#include "campaign/fitjson.h"
+#include "cli/fit_options.h"
+#include "cli/fitview.h"
+#include "cli/out.h"
+#include "cli/verb.h"
+
+#include <errno.h>
+#include <jansson.h>
+#include <math.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct options {
+    bool json;
+    const char *column, *angles, *trace, *dir;
+    struct fit_words words;
+    double theta_i_max_deg;
+    long seed, threads;
+};
+
+static const struct option_row rows[] = {
+    {"--column", OPTION_TEXT, offsetof(struct options, column), "NAME", 0, 0, "the CSV's value column (f_r)"},
+    {"--theta-i-max", OPTION_REAL, offsetof(struct options, theta_i_max_deg), "DEG", 0, 90,
+     "leave out larger angles of incidence"},
+    {"--theta-i", OPTION_TEXT, offsetof(struct options, angles), "LIST", 0, 0, "only these: 0,10,20"},
+    {"--weights", OPTION_TEXT, offsetof(struct options, words.weights), "W", 0, 0,
+     "uniform, dense:G, relative or variance (variance when every value has u_f_r)"},
+    {"--method", OPTION_TEXT, offsetof(struct options, words.method), "M", 0, 0,
+     "memetic, or paper: its binary genetic algorithm (memetic)"},
+    {"--diffuse", OPTION_TEXT, offsetof(struct options, words.diffuse), "D", 0, 0,
+     "paper: kd/cos(theta_i), or lambert: kd/pi (paper)"},
+    {"--bounds", OPTION_TEXT, offsetof(struct options, words.bounds), "LIST", 0, 0, "n=0.2:8,k=0:10,..."},
+    {"--seed", OPTION_INT, offsetof(struct options, seed), "N", 0, 4294967295.0, "of the search (1)"},
+    {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64, "workers (1)"},
+    {"--trace", OPTION_TEXT, offsetof(struct options, trace), "FILE", 0, 0, "write each generation's Delta as CSV"},
+    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0, "the folder of campaigns ($GONIO_DIR)"},
+    {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
+    VERB_OPTIONS_END,
+};
+
+// Ctrl-C is blocked while the fit runs and seen here.
+static bool canceled(void *ctx)
+{
+    sigset_t pending;
+    (void)ctx;
+    return sigpending(&pending) == 0 && sigismember(&pending, SIGINT) == 1;
+}
+
+static void add_trace(void *ctx, int generation, double best, double mean)
+{
+    fprintf(ctx, "%d,%.17g,%.17g\n", generation, best, mean);
+}
+
+static bool ends_with(const char *text, const char *end)
+{
+    size_t n = strlen(text), m = strlen(end);
+    return n >= m && !strcmp(text + n - m, end);
+}
+
+static int filter_of(const struct options *o, struct dataset_filter *ret_filter, struct gon_error *err)
+{
+    struct dataset_filter f = dataset_filter_all();
+    if (isfinite(o->theta_i_max_deg))
+        f.theta_i_max_deg = o->theta_i_max_deg;
+    if (o->angles) {
+        int count = fit_angles_take(o->angles, f.theta_i_deg, FIT_MOST_ANGLES, err);
+        if (count < 0)
+            return count;
+        f.theta_i_count = count;
+    }
+    *ret_filter = f;
+    return GON_OK;
+}
+
+// A number, a name, or a .gonio file is a campaign; anything else is a CSV. A campaign brings the options
+// of its configuration.
+static int load_campaign(const struct options *o, const char *file, struct dataset_filter *filter,
+                         struct dataset *ret_data, struct fit_options *options, struct gon_error *err)
+{
+    char directory[CATALOG_PATH], path[CATALOG_PATH];
+    struct store *store = NULL;
+    struct campaign_config config;
+    if (o->column)
+        return gon_fail(err, GON_E_INPUT, "--column is for CSV files; a campaign has one value column");
+    int rc = catalog_directory(o->dir, directory, sizeof directory, err);
+    rc = rc < 0 ? rc : catalog_resolve(directory, file, path, sizeof path, err);
+    rc = rc < 0 ? rc : store_open(path, STORE_READ, &store, err);
+    rc = rc < 0 ? rc : store_read_config(store, &config, err);
+    if (rc == 0) {
+        *options = campaign_fit_options(&config);
+        if (!isfinite(o->theta_i_max_deg))
+            filter->theta_i_max_deg = config.fit.theta_i_max_deg;
+        rc = dataset_from_store(store, filter, ret_data, NULL, err);
+    }
+    store_close(store, NULL);
+    return rc;
+}
+
+static bool is_file(const char *path)
+{
+    FILE *f = fopen(path, "rb");
+    if (f)
+        fclose(f);
+    return f || errno != ENOENT;
+}
+
+static int load(const struct options *o, const char *file, struct dataset *ret_data, struct fit_options *options,
+                struct gon_error *err)
+{
+    struct dataset_filter filter;
+    int rc = filter_of(o, &filter, err);
+    if (rc < 0)
+        return rc;
+    bool campaign = ends_with(file, STORE_SUFFIX) || !is_file(file);
+    rc = campaign ? load_campaign(o, file, &filter, ret_data, options, err)
+                  : dataset_from_csv(file, o->column, &filter, ret_data, err);
+    if (rc < 0)
+        return rc;
+    if (!campaign && ret_data->u_per_sr)
+        options->weighting = FIT_VARIANCE;
+    if (options->weighting == FIT_VARIANCE && !ret_data->u_per_sr)
+        options->weighting = FIT_UNIFORM;
+    return GON_OK;
+}
+
+static int set_options(const struct options *o, struct fit_options *options, struct gon_error *err)
+{
+    int rc = fit_words_take(&o->words, options, err);
+    if (o->seed >= 0)
+        options->seed = (uint64_t)o->seed;
+    options->threads = o->threads > 0 ? (int)o->threads : 1;
+    options->canceled = canceled;
+    return rc;
+}
+
+static int search(const struct dataset *data, const struct options *o, struct fit_options *options,
+                  struct fit_result *ret_result, struct gon_error *err)
+{
+    FILE *trace = o->trace ? fopen(o->trace, "w") : NULL;
+    if (o->trace && !trace)
+        return gon_fail(err, GON_E_INPUT, "--trace %s: %s", o->trace, strerror(errno));
+    if (trace) {
+        fputs("generation,best_delta,mean_delta\n", trace);
+        options->trace = add_trace;
+        options->trace_ctx = trace;
+    }
+    options->u_scale = data->u_scale;
+    struct fit_data d = dataset_fit_data(data);
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigprocmask(SIG_BLOCK, &set, NULL); // until the end: what is left is printing
+    int stop = fit_run(&d, options, ret_result), rc = GON_OK;
+    if (stop == FIT_E_CANCELED)
+        rc = gon_fail(err, GON_E_CANCELED, "interrupted; nothing was fitted");
+    else if (stop == FIT_E_OPTIONS || stop == FIT_E_DATA || stop == FIT_E_ALL_ZERO || stop == FIT_E_FEW_POINTS)
+        rc = gon_fail(err, GON_E_INPUT, "%s: %s (%zu points)", data->source, fit_stop_text(stop), data->count);
+    else if (stop < 0)
+        rc = gon_fail(err, GON_E_SYSTEM, "%s: %s", data->source, fit_stop_text(stop));
+    if (trace && fclose(trace) != 0 && rc == 0)
+        rc = gon_fail(err, GON_E_SYSTEM, "--trace %s: %s", o->trace, strerror(errno));
+    return rc;
+}
+
+static int print(const struct fit_record *record, const struct dataset *data, bool json)
+{
+    char *text = fit_json(record, json ? 2 : 0);
+    if (!text) {
+        out_say("out of memory");
+        return EXIT_FAILED;
+    }
+    if (json) {
+        puts(text);
+    } else {
+        json_t *o = json_loads(text, 0, NULL);
+        fprintf(stderr, "%s: %zu points%s, %s weights, %s, seed %llu, %.0f ms\n", data->source, record->points,
+                data->left_out ? " (others left out by the filter)" : "",
+                fit_weighting_name(record->options.weighting), fit_method_name(record->options.method),
+                (unsigned long long)record->options.seed, record->result.elapsed_total_ms);
+        fitview_print(o);
+        json_decref(o);
+    }
+    free(text);
+    return EXIT_OK;
+}
+
+static int run_fit(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {.theta_i_max_deg = (double)INFINITY, .seed = -1};
+    struct fit_record record = {.sweep = -1, .options = fit_options_default()};
+    struct dataset data = {0};
+    struct gon_error err;
+    const char *file;
+    if (verb_take(verb, argc, argv, &o, &file, 1, 1) < 0)
+        return EXIT_INPUT;
+    int rc = load(&o, file, &data, &record.options, &err);
+    rc = rc < 0 ? rc : set_options(&o, &record.options, &err);
+    rc = rc < 0 ? rc : search(&data, &o, &record.options, &record.result, &err);
+    record.points = data.count;
+    int status = rc < 0 ? out_fail(&err) : print(&record, &data, o.json);
+    dataset_clear(&data);
+    return status;
+}
+
+const struct verb verb_fit = {
+    "fit", "DATA", "parameters with uncertainties, from a CSV or a campaign",
+    "DATA is a CSV with theta_i_deg, theta_r_signed_deg (or theta_r_deg and dphi_deg), f_r and optionally\n"
+    "u_f_r, pol_in, pol_out; or a campaign: a file, or the name or number that gonio list shows. Prints n, k,\n"
+    "sigma, ks, kd with standard uncertainty and 95 % interval, and what the data identify better than n, k\n"
+    "and ks alone: ks*R at normal incidence and at 45 deg, and the reflectance of the hemisphere.\n",
+    rows, run_fit};
