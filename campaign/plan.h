@@ -40,7 +40,7 @@ struct plan {
     struct plan_point *points;
     int count;   // all points: samples and references
     int samples; // of them on the sample
-    int sweeps;  // with a sample point; sweep numbers 1..sweeps
+    int sweeps;  // one a theta_i, numbered 1..sweeps; one of which nothing is left has no points
     struct plan_skip *skips;
     int skips_count;
     char (*warnings)[240]; // one sentence each

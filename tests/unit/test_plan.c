@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT
+// uses: campaign fit model base
+#include "campaign_fixture.h"
+
+#include "base/units.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+static struct plan planned(const char *text, const struct bench_config *bench)
+{
+    const struct campaign_config c = fixture_campaign(text);
+    struct plan p;
+    struct gon_error err;
+    assert_int_equal(plan_make(&c, bench, &p, &err), 0);
+    return p;
+}
+
+static bool warns(const struct plan *p, const char *part)
+{
+    for (int i = 0; i < p->warnings_count; i++)
+        if (strstr(p->warnings[i], part))
+            return true;
+    return false;
+}
+
+// Ten sweeps; 69 coarse directions each, and 21 dense ones of which 5 lie on the coarse grid.
+static void the_papers_campaign_has_850_points(void **state)
+{
+    (void)state;
+    struct campaign_config c;
+    struct said said = {0};
+    struct plan p;
+    assert_int_equal(
+        campaign_config_load("configs/paper.cfg", (struct cfg_sink){fixture_say, &said}, &c, NULL),
+        0);
+    assert_string_equal(said.text, "");
+    assert_int_equal(plan_make(&c, NULL, &p, NULL), 0);
+    assert_int_equal(p.samples, 850);
+    assert_int_equal(p.count, 854);
+    assert_int_equal(p.sweeps, 10);
+    assert_int_equal(p.skips_count, 0);
+    int dense = 0, at_45 = 0;
+    double lowest_deg = 90, highest_deg = -90, weight = 0;
+    for (int i = 0; i < p.count; i++) {
+        dense += p.points[i].dense;
+        weight += p.points[i].kind == PLAN_SAMPLE ? p.points[i].weight : 0;
+        if (p.points[i].theta_i_deg == 45 && p.points[i].dense) {
+            at_45++;
+            lowest_deg = fmin(lowest_deg, p.points[i].theta_r_deg);
+            highest_deg = fmax(highest_deg, p.points[i].theta_r_deg);
+        }
+    }
+    assert_int_equal(dense, 210); // the edges included
+    assert_int_equal(at_45, 21);
+    assert_true(lowest_deg == 40 && highest_deg == 50);
+    assert_true(weight == 640 + 3 * 210);
+    assert_true(isnan(p.duration_s));
+    plan_clear(&p);
+}
+
+static void references_stand_around_the_sweeps(void **state)
+{
+    (void)state;
+    const struct bench_config b = fixture_bench();
+    struct plan p = planned("campaign: { name = \"a\"; theta_i_deg = (20, 10);"
+                            " theta_r: { from_deg = -10; to_deg = 30; step_deg = 10; };"
+                            " dense: { half_width_deg = 0.5; }; };",
+                            &b);
+    const struct {
+        int sweep, point;
+        enum plan_kind kind;
+        double theta_i_deg, theta_r_deg;
+    } expected[] = {
+        {0, 0, PLAN_DARK, 0, 180},    {0, 1, PLAN_BEAM, 0, 180},     {1, 0, PLAN_SAMPLE, 20, -10},
+        {1, 1, PLAN_SAMPLE, 20, 0},   {1, 2, PLAN_SAMPLE, 20, 10},   {1, 3, PLAN_SAMPLE, 20, 19.5},
+        {1, 4, PLAN_SAMPLE, 20, 20},  {1, 5, PLAN_SAMPLE, 20, 20.5}, {1, 6, PLAN_SAMPLE, 20, 30},
+        {2, 0, PLAN_SAMPLE, 10, -10}, {2, 1, PLAN_SAMPLE, 10, 0},    {2, 2, PLAN_SAMPLE, 10, 9.5},
+        {2, 3, PLAN_SAMPLE, 10, 10},  {2, 4, PLAN_SAMPLE, 10, 10.5}, {2, 5, PLAN_SAMPLE, 10, 20},
+        {2, 6, PLAN_SAMPLE, 10, 30},  {3, 0, PLAN_BEAM, 0, 180},     {3, 1, PLAN_DARK, 0, 180},
+    };
+    assert_int_equal(p.count, sizeof expected / sizeof *expected);
+    for (int i = 0; i < p.count; i++) {
+        assert_int_equal(p.points[i].sweep, expected[i].sweep);
+        assert_int_equal(p.points[i].point, expected[i].point);
+        assert_int_equal(p.points[i].kind, expected[i].kind);
+        assert_true(p.points[i].theta_i_deg == expected[i].theta_i_deg);
+        assert_true(p.points[i].theta_r_deg == expected[i].theta_r_deg);
+        assert_string_equal(p.points[i].station, expected[i].kind == PLAN_SAMPLE ? "" : "beam");
+        assert_false(p.points[i].done);
+    }
+    assert_true(warns(&p, "2 angles of incidence"));
+    plan_clear(&p);
+}
+
+// 0.1 is no binary number: sums of it must not make two points of one direction.
+static void directions_are_merged_in_micro_degrees(void **state)
+{
+    (void)state;
+    struct plan p = planned("campaign: { name = \"a\"; theta_i_deg = (0.3, 10, 20);"
+                            " theta_r: { from_deg = -1; to_deg = 1; step_deg = 0.1; };"
+                            " dense: { half_width_deg = 0.3; step_deg = 0.1; }; };",
+                            NULL);
+    assert_int_equal(p.samples, 3 * 21);
+    int dense = 0;
+    for (int i = 0; i < p.count; i++)
+        dense += p.points[i].dense;
+    assert_int_equal(dense, 7);
+    plan_clear(&p);
+}
+
+static void skipped_points_say_why(void **state)
+{
+    (void)state;
+    struct bench_config b = fixture_bench();
+    b.axes[1].max = 25;
+    struct plan p =
+        planned("campaign: { name = \"a\"; theta_i_deg = (0, 10, 20); blind_half_deg = 5;"
+                " theta_r: { from_deg = -30; to_deg = 30; step_deg = 5; };"
+                " dense: { half_width_deg = 0; }; };",
+                &b);
+    // In each sweep 13 directions: 30 is beyond the axis, and -theta_i +- 0 in the shadow; +-5 is
+    // not.
+    assert_int_equal(p.samples, 3 * 11);
+    assert_int_equal(p.skips_count, 6);
+    assert_int_equal(p.skips[0].reason, PLAN_SKIP_BLIND);
+    assert_true(p.skips[0].theta_r_deg == 0);
+    assert_int_equal(p.skips[1].reason, PLAN_SKIP_LIMITS);
+    assert_true(p.skips[1].theta_r_deg == 30);
+    assert_true(warns(&p, "theta_i = 0 deg: the specular direction lies in the detector's shadow"));
+    assert_true(warns(&p, "3 points lie beyond the limits"));
+    assert_false(warns(&p, "grazing"));
+    plan_clear(&p);
+    const struct campaign_config c =
+        fixture_campaign("campaign: { name = \"a\"; theta_i_deg = 10; };");
+    struct gon_error err;
+    b.axes[0].max = 5;
+    assert_int_equal(plan_make(&c, &b, &p, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "nothing is left to measure"));
+}
+
+static void warnings_name_what_spoils_the_fit(void **state)
+{
+    (void)state;
+    struct bench_config b = fixture_bench();
+    b.laser.polarisation = POL_UNKNOWN;
+    struct plan p = planned("campaign: { name = \"a\"; theta_i_deg = (0, 30, 60); pol_out = \"s\";"
+                            " theta_r: { from_deg = -85; to_deg = 50; }; };",
+                            &b);
+    assert_true(warns(&p, "theta_i = 60 deg: the specular direction lies outside"));
+    assert_true(warns(&p, "3 points at |theta_r| >= 85 deg"));
+    assert_true(warns(&p, "polarisation is unknown"));
+    assert_true(warns(&p, "analyser"));
+    plan_clear(&p);
+    p = planned("campaign: { name = \"a\"; theta_i_deg = (0, 30, 60); pol_in = \"s\"; };", &b);
+    assert_true(warns(&p, "an element must be in the beam"));
+    plan_clear(&p);
+}
+
+// n-pole tables of lock-in manuals: 1e-4 after 9.2, 11.8, 13.9, 15.9 time constants.
+static void filters_settle_as_tabulated(void **state)
+{
+    (void)state;
+    const double settle[] = {9.2103, 11.7564, 13.9282, 15.9137}; // of an independent root finder
+    const double spacing[] = {2.9957, 4.7439, 5.9186, 6.8767};
+    for (int n = 1; n <= 4; n++) {
+        assert_true(fabs(plan_settle_s(0.1, 6 * n) - 0.1 * settle[n - 1]) < 1e-4);
+        assert_true(fabs(plan_spacing_s(0.1, 6 * n) - 0.1 * spacing[n - 1]) < 1e-4);
+    }
+}
+
+// By hand: 2 s warm-up; dark and beam at (0, 180); to (30, 0): 180 deg at 20 deg/s and 60 deg/s^2
+// is 9.3333 s; 10 deg steps 0.8333 s, short ones of 1 deg 2 sqrt(1/60) s; back to (0, 180).
+static void duration_adds_moves_and_readings(void **state)
+{
+    (void)state;
+    struct bench_config b = fixture_bench();
+    b.laser.warmup_s = 2;
+    struct plan p =
+        planned("campaign: { name = \"a\"; theta_i_deg = 30;"
+                " theta_r: { from_deg = 0; to_deg = 10; step_deg = 10; };"
+                " dense: { half_width_deg = 0; };"
+                " readings: { count = 3; }; beam: { count = 1; }; dark: { count = 1; }; };",
+                &b);
+    const double settle_s = plan_settle_s(0.001, 12), spacing_s = plan_spacing_s(0.001, 12);
+    const double expected_s = 2 + (180.0 / 20 + 20.0 / 60) + (10.0 / 20 + 20.0 / 60) +
+                              (170.0 / 20 + 20.0 / 60) + 6 * (0.03 + settle_s) + 2 * 2 * spacing_s;
+    assert_true(fabs(p.duration_s - expected_s) < 1e-9);
+    plan_clear(&p);
+}
+
+static void too_many_points_are_refused(void **state)
+{
+    (void)state;
+    struct campaign_config c =
+        fixture_campaign("campaign: { name = \"a\"; theta_i_deg = 0;"
+                         " theta_r: { step_deg = 0.01; }; dense: { half_width_deg = 0; }; };");
+    for (c.theta_i_count = 0; c.theta_i_count < 70; c.theta_i_count++)
+        c.theta_i_deg[c.theta_i_count] = c.theta_i_count;
+    struct plan p;
+    struct gon_error err;
+    assert_int_equal(plan_make(&c, NULL, &p, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "more than 1000000 points"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_papers_campaign_has_850_points),
+        cmocka_unit_test(references_stand_around_the_sweeps),
+        cmocka_unit_test(directions_are_merged_in_micro_degrees),
+        cmocka_unit_test(skipped_points_say_why),
+        cmocka_unit_test(warnings_name_what_spoils_the_fit),
+        cmocka_unit_test(filters_settle_as_tabulated),
+        cmocka_unit_test(duration_adds_moves_and_readings),
+        cmocka_unit_test(too_many_points_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
