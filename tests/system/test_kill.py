@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""kill -9 of goniod at 20 random moments of one campaign: every reading that was announced (it is announced after
+its commit) is in the file, `gonio resume` goes on where it stopped, and nothing is measured twice but the point in
+progress."""
+import json
+import os
+import random
+import signal
+import sqlite3
+import time
+
+from conftest import Daemon
+
+PLAN = """\
+campaign: {
+  name = "killed";
+  theta_i_deg = [ 0.0, 15.0, 30.0, 45.0, 60.0 ];
+  theta_r: { from_deg = -80.0; to_deg = 80.0; step_deg = 4.0; };
+  dense: { half_width_deg = 4.0; step_deg = 1.0; };
+  readings: { count = 2; };
+};
+"""
+SEED = int(os.environ.get("GONIO_TEST_SEED", "20261123"))
+KILLS = 20
+
+
+def rows(path):
+    with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as db:
+        return db.execute("select sweep, point, attempt, flags from reading").fetchall()
+
+
+def test_no_acknowledged_reading_is_lost_in_twenty_kills(start_sim, tmp_path):
+    random_ = random.Random(SEED)
+    print("seed", SEED)
+    sim = start_sim("--fast", "--seed", "3", "--set", "laser.warmup_s=0.05", "--set", "laser.temperatures_s=0")
+    run = file = None
+    announced, repeated = set(), 0
+
+    for kill in range(KILLS + 1):
+        d = Daemon(tmp_path, "--config", sim.folder / "goniod-tcp.cfg")
+        try:
+            if run is None:
+                reply = d.submit(PLAN, "killed.cfg")
+                run, file = reply["run"], reply["file"]
+                events = d.follow(0)
+            else:
+                events = d.follow()
+                resumed = d.gonio("resume", run, "--detach")
+                assert resumed.returncode == 0, resumed.stderr
+            if kill == KILLS:
+                events.until_state(run, "done")
+                break
+            wait_for = random_.randrange(1, 12)  # readings, then a random part of a point's time
+            deadline = time.monotonic() + 30
+            while wait_for and time.monotonic() < deadline:
+                e = events.next()
+                if e["event"] == "reading" and e["run"] == run:
+                    announced.add((e["sweep"], e["point"]))
+                    wait_for -= 1
+            assert not wait_for, "no readings for 30 s"
+            time.sleep(random_.random() * 0.08)  # the moment itself, not a wait for something
+        finally:
+            d.end(signal.SIGKILL if kill < KILLS else signal.SIGTERM)
+        stored = {(s, p) for s, p, _, _ in rows(file)}
+        assert announced <= stored, f"lost after kill {kill}: {sorted(announced - stored)}"
+
+    accepted = {}
+    for sweep, point, attempt, flags in rows(file):
+        if not flags & 0xFF:
+            accepted[(sweep, point)] = accepted.get((sweep, point), 0) + 1
+    repeated = sum(n - 1 for n in accepted.values())
+    assert repeated == 0, "an accepted point is never measured again"
+    with sqlite3.connect(f"file:{file}?mode=ro", uri=True) as db:
+        planned = set(db.execute("select sweep, point from plan").fetchall())
+    assert set(accepted) == planned
+    shown = json.loads(Daemon.gonio(d, "show", run, "--json").stdout)
+    assert shown["state"] == "done"
