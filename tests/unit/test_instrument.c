@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: MIT
+// uses: daemon campaign drivers fit sim model base
+#include "daemon/instrument.h"
+#include "tests/unit/simbench.h"
+#include "tests/unit/simconfig.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+struct setting {
+    struct simbench b;
+    struct bench_config bench;
+    struct instrument *in;
+    struct instrument_snapshot now;
+    int watched;
+    int64_t watched_ns, longest_ns;
+};
+
+static struct setting *begin(void)
+{
+    struct setting *s = calloc(1, sizeof *s);
+    simbench_init(&s->b, NULL);
+    simconfig_bench(&s->bench);
+    return s;
+}
+
+static void make(struct setting *s)
+{
+    struct instrument_parts parts = simbench_parts(&s->b);
+    assert_int_equal(instrument_new(&s->bench, &parts, &s->b.clk.clk, &s->in, NULL), 0);
+}
+
+static void end(struct setting *s)
+{
+    instrument_free(s->in);
+    free(s);
+}
+
+static void what_is_there_is_opened_and_the_laser_is_off_first(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    s->b.world.laser.state = SIM_LASER_COMPLETED;
+    make(s);
+    assert_int_equal(instrument_lost(s->in), PART_COUNT);
+    assert_int_equal(instrument_tend(s->in), 0);
+    instrument_snapshot(s->in, &s->now);
+    for (int i = 0; i < PART_COUNT; i++)
+        assert_int_equal(s->now.part[i].link, PART_OK);
+    assert_false(sim_laser_emits(&s->b.world.laser));
+    assert_string_equal(s->now.part[PART_LASER].identity, "simulated laser");
+    assert_string_equal(s->now.part[PART_DETECTOR].identity, "simulated lock-in");
+    assert_string_equal(s->now.axis[PART_SAMPLE].unit, "mm");
+    assert_true(fabs(s->now.axis[PART_THETA_R].position - -7.5) < 1e-9);
+    assert_true(isfinite(s->now.signal_v) && s->now.range == -1);
+    assert_true(s->b.axis[PART_THETA_I].stops > 0);
+    end(s);
+}
+
+static void what_is_not_there_is_lost_by_name_and_comes_back(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    for (int i = 0; i < SIMBENCH_DEVICES; i++)
+        s->b.gone_until_ns[i] = s->b.clk.t_ns + CLK_S(5);
+    make(s);
+    assert_int_equal(instrument_lost(s->in), PART_THETA_I);
+    instrument_snapshot(s->in, &s->now);
+    static const char *const problems[PART_COUNT] = {"axis theta_i: hung up", "axis theta_r: hung up",
+                                                     "axis sample: hung up", "laser: hung up",
+                                                     "detector: hung up"};
+    for (int i = 0; i < PART_COUNT; i++) {
+        assert_int_equal(s->now.part[i].link, PART_LOST);
+        assert_string_equal(s->now.part[i].problem, problems[i]);
+    }
+    struct gon_error err;
+    struct detector_sample sample;
+    assert_int_equal(instrument_sample(s->in, &sample, &err), GON_E_GONE);
+    assert_string_equal(err.text, "detector: hung up");
+    while (s->b.clk.t_ns < CLK_S(20) && instrument_tend(s->in) > 0)
+        clk_sleep(&s->b.clk.clk, CLK_MS(100), NULL);
+    assert_true(s->b.clk.t_ns < CLK_S(6 + 2.2)); // tried at most 2 s apart
+    instrument_snapshot(s->in, &s->now);
+    for (int i = 0; i < PART_COUNT; i++) {
+        assert_int_equal(s->now.part[i].link, PART_OK);
+        assert_int_equal(s->now.part[i].returns, 1);
+        assert_string_equal(s->now.part[i].problem, "");
+    }
+    end(s);
+}
+
+static void tries_to_reconnect_are_paced(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    make(s);
+    s->b.gone_until_ns[SIMBENCH_DETECTOR] = INT64_MAX;
+    instrument_tend(s->in);
+    const long calls = s->b.calls;
+    for (int i = 0; i < 1000; i++) { // 10 s
+        instrument_reconnect(s->in);
+        clk_sleep(&s->b.clk.clk, CLK_MS(10), NULL);
+    }
+    const long tries = s->b.calls - calls; // 0.2, 0.4, 0.8, 1.6, 2, 2, 2 s
+    assert_true(tries >= 6 && tries <= 8);
+    end(s);
+}
+
+static void a_laser_that_lights_by_itself_is_switched_off(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    make(s);
+    s->b.world.laser.state = SIM_LASER_COMPLETED;
+    instrument_tend(s->in);
+    assert_false(sim_laser_emits(&s->b.world.laser));
+    end(s);
+}
+
+static void an_off_that_was_not_confirmed_is_repeated_when_idle(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    make(s);
+    instrument_permit(s->in, true);
+    assert_int_equal(instrument_emission_on(s->in, NULL), 0);
+    s->b.gone_until_ns[SIMBENCH_LASER] = s->b.clk.t_ns + CLK_S(5);
+    assert_int_equal(instrument_emission_off(s->in, NULL), GON_E_GONE);
+    instrument_snapshot(s->in, &s->now);
+    assert_true(s->now.off_unconfirmed && s->now.emission);
+    for (int i = 0; i < 10; i++) {
+        instrument_tend(s->in);
+        clk_sleep(&s->b.clk.clk, CLK_S(1), NULL);
+    }
+    instrument_snapshot(s->in, &s->now);
+    assert_false(s->now.off_unconfirmed || s->now.emission);
+    assert_false(sim_laser_emits(&s->b.world.laser));
+    end(s);
+}
+
+static void watcher(void *ctx)
+{
+    struct setting *s = ctx;
+    if (s->watched++ > 0 && s->b.clk.t_ns - s->watched_ns > s->longest_ns)
+        s->longest_ns = s->b.clk.t_ns - s->watched_ns;
+    s->watched_ns = s->b.clk.t_ns;
+}
+
+static void waiting_renews_the_lease_every_100_ms(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    make(s);
+    instrument_watch(s->in, watcher, s);
+    instrument_permit(s->in, true);
+    assert_int_equal(instrument_emission_on(s->in, NULL), 0);
+    assert_int_equal(instrument_wait(s->in, s->b.clk.t_ns + CLK_S(10), NULL), 0);
+    assert_int_equal(s->watched, 101);
+    assert_true(s->longest_ns == CLK_MS(100));
+    assert_true(safety_worst_gap_ns(instrument_safety(s->in)) == CLK_MS(100));
+    end(s);
+}
+
+static void user_units_have_zero_and_direction(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    struct axis_place p;
+    struct gon_error err;
+    s->bench.axes[0].zero = 1.5;            // position at step 0
+    s->bench.axes[1].steps_per_unit = -500; // the motor is mounted the other way round
+    make(s);
+    assert_int_equal(instrument_go(s->in, PART_THETA_I, 11.5, &err), 0);
+    assert_int_equal(s->b.axis[PART_THETA_I].target_steps, 10000);
+    assert_int_equal(instrument_go(s->in, PART_THETA_R, 20.0, &err), 0);
+    assert_int_equal(s->b.axis[PART_THETA_R].target_steps, -10000);
+    clk_sleep(&s->b.clk.clk, CLK_S(20), NULL);
+    assert_int_equal(instrument_place(s->in, PART_THETA_I, &p, &err), 0);
+    assert_true(fabs(p.position - 11.5) < 1e-9);
+    assert_int_equal(instrument_place(s->in, PART_THETA_R, &p, &err), 0);
+    assert_true(fabs(p.position - 20.0) < 1e-9);
+    assert_true(fabs(instrument_rounded(s->in, PART_THETA_R, 20.0009) - 20.0) < 1e-9);
+    assert_int_equal(instrument_go(s->in, PART_THETA_R, -181, &err), GON_E_INPUT);
+    assert_int_equal(instrument_go(s->in, PART_THETA_R, NAN, &err), GON_E_INPUT);
+    end(s);
+}
+
+static void a_bench_without_a_sample_stage_has_none(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    s->bench.axes_count = 2;
+    struct instrument_parts parts = simbench_parts(&s->b);
+    parts.axis[PART_SAMPLE] = NULL;
+    assert_int_equal(instrument_new(&s->bench, &parts, &s->b.clk.clk, &s->in, NULL), 0);
+    assert_false(instrument_has(s->in, PART_SAMPLE));
+    assert_int_equal(instrument_tend(s->in), 0);
+    end(s);
+}
+
+// Real drivers, ports that do not exist: the daemon starts nevertheless and says what is missing.
+static void ports_that_are_not_there_do_not_stop_the_daemon(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    s->bench.buses_count = 1;
+    snprintf(s->bench.buses[0].name, sizeof s->bench.buses[0].name, "axes");
+    snprintf(s->bench.buses[0].link, sizeof s->bench.buses[0].link, "modbus-rtu:/nowhere/axes?baud=115200");
+    s->bench.buses[0].timeout_ms = 100;
+    for (int i = 0; i < 3; i++) {
+        snprintf(s->bench.axes[i].bus, sizeof s->bench.axes[i].bus, "axes");
+        s->bench.axes[i].unit = i + 1;
+    }
+    snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "serial:/nowhere/laser?baud=115200");
+    snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/detector?baud=9600");
+    struct gon_error err;
+    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), 0);
+    instrument_snapshot(s->in, &s->now);
+    for (int i = 0; i < PART_COUNT; i++) {
+        assert_int_equal(s->now.part[i].link, PART_LOST);
+        assert_non_null(strstr(s->now.part[i].problem, "/nowhere/"));
+        assert_non_null(strstr(s->now.part[i].address, "/nowhere/"));
+    }
+    assert_true(instrument_tend(s->in) > 0);
+    assert_int_equal(instrument_emission_on(s->in, &err), GON_E_GONE);
+    assert_non_null(strstr(err.text, "laser: not there (serial:/nowhere/laser"));
+    end(s);
+}
+
+static void a_link_that_is_no_link_is_an_error_of_the_bench(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    struct gon_error err;
+    s->bench.axes_count = 0;
+    snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "carrier-pigeon:laser");
+    snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/detector");
+    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "laser: "));
+    assert_null(s->in);
+    free(s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_there_is_opened_and_the_laser_is_off_first),
+        cmocka_unit_test(what_is_not_there_is_lost_by_name_and_comes_back),
+        cmocka_unit_test(tries_to_reconnect_are_paced),
+        cmocka_unit_test(a_laser_that_lights_by_itself_is_switched_off),
+        cmocka_unit_test(an_off_that_was_not_confirmed_is_repeated_when_idle),
+        cmocka_unit_test(waiting_renews_the_lease_every_100_ms),
+        cmocka_unit_test(user_units_have_zero_and_direction),
+        cmocka_unit_test(a_bench_without_a_sample_stage_has_none),
+        cmocka_unit_test(ports_that_are_not_there_do_not_stop_the_daemon),
+        cmocka_unit_test(a_link_that_is_no_link_is_an_error_of_the_bench),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
