@@ -3,9 +3,12 @@
 #include "base/options.h"
 #include "sim/server.h"
 
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 enum { MOST_SETS = 64 };
 
@@ -15,6 +18,7 @@ struct arguments {
     bool fast, with_parent, help, version;
     char *sets[MOST_SETS];
     int set_count;
+    pid_t parent; // 0: does not matter
 };
 
 static const struct option_row rows[] = {
@@ -89,10 +93,10 @@ static int serve(struct arguments *a)
     if (rc)
         return fail(&err);
     printf("goniosim %s: %s, seed %d%s\nready\n", GONIO_VERSION, a->run_dir, config.seed, a->fast ? ", fast" : "");
-    fflush(stdout);
-    rc = server_run(server, a->with_parent, &err);
+    if (fflush(stdout) == 0 || !a->with_parent) // else whoever waits for it is gone
+        server_run(server, a->parent);
     server_close(server);
-    return rc ? fail(&err) : 0;
+    return 0;
 }
 
 int main(int argc, char **argv)
@@ -114,6 +118,10 @@ int main(int argc, char **argv)
     if (!a.run_dir) {
         gon_fail(&err, GON_E_INPUT, "--run-dir DIR is missing; see --help");
         return fail(&err);
+    }
+    if (a.with_parent) {
+        a.parent = getppid();
+        prctl(PR_SET_PDEATHSIG, SIGTERM);
     }
     return serve(&a);
 }

@@ -264,15 +264,12 @@ static bool turn(struct server *s, int64_t most_ns)
     return !fds[0].revents;
 }
 
-int server_run(struct server *s, bool with_parent, struct gon_error *err)
+void server_run(struct server *s, pid_t parent)
 {
-    pid_t parent = getppid();
     prctl(PR_SET_TIMERSLACK, 1000UL);
-    if (with_parent && (prctl(PR_SET_PDEATHSIG, SIGTERM) || parent == 1))
-        return gon_fail(err, GON_E_REFUSED, "the parent process is gone already");
-    for (;;) {
-        int64_t most_ns = clk_now_ns(clk_system()) + (with_parent ? PARENT_NS : 3600 * INT64_C(1000000000));
-        if (!turn(s, most_ns) || (with_parent && getppid() != parent))
-            return 0;
-    }
+    do {
+        int64_t most_ns = clk_now_ns(clk_system()) + (parent ? PARENT_NS : 3600 * INT64_C(1000000000));
+        if (!turn(s, most_ns))
+            return;
+    } while (!parent || getppid() == parent);
 }

@@ -5,13 +5,14 @@
 #include "base/err.h"
 #include "sim/config.h"
 
-#include <stdbool.h>
+#include <sys/types.h>
 
 struct server;
 
 // Opens everything below the run directory; ready when it returns 0.
 int server_open(const struct sim_config *config, const char *run_dir, struct server **ret_server,
                 struct gon_error *err);
-// Until SIGTERM or SIGINT (blocked by then; 0), or with_parent and the parent is gone.
-int server_run(struct server *s, bool with_parent, struct gon_error *err);
+// Until SIGTERM, SIGINT or SIGHUP (they are blocked by then), or until parent is not the parent process
+// any more (0: whoever it is).
+void server_run(struct server *s, pid_t parent);
 void server_close(struct server *s);

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/inotify.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -40,13 +41,18 @@ static int publish(const char *target, const char *path, struct gon_error *err)
     return 0;
 }
 
-static void pty_close(struct wire *w)
+static void close_both(struct wire *w)
 {
     for (int i = 0; i < 2; i++) {
         if (w->fd[i] >= 0)
             close(w->fd[i]);
         w->fd[i] = -1;
     }
+}
+
+static void pty_close(struct wire *w)
+{
+    close_both(w);
     unlink(w->address);
 }
 
@@ -82,25 +88,54 @@ static int pty_fds(struct wire *w, struct pollfd fds[WIRE_FDS])
     return 2;
 }
 
+static bool vacant(const struct wire *w)
+{
+    struct pollfd now = {.fd = w->fd[MASTER], .events = POLLIN};
+    return poll(&now, 1, 0) > 0 && (now.revents & POLLHUP);
+}
+
+static bool somebody_opened(const struct wire *w)
+{
+    char events[512];
+    bool any = false;
+    while (read(w->fd[WATCH], events, sizeof events) > 0)
+        any = true;
+    return any;
+}
+
+// Replies that nobody read stay with the slave and would meet the next client; a serial port forgets
+// them when it is closed, as it forgets TIOCEXCL. Only through the slave can that be done, and not even
+// there if somebody who is not root finds it claimed: then there is a new pty under the same name.
+static void forget(struct wire *w)
+{
+    int slave = ioctl(w->fd[MASTER], TIOCGPTPEER, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    if (slave < 0) {
+        close_both(w);
+        pty_open(w, NULL); // without one the wire is dead, as its state then shows
+        return;
+    }
+    ioctl(slave, TIOCNXCL);
+    tcflush(slave, TCIFLUSH);
+    close(slave);
+    somebody_opened(w); // that was here
+    pristine(w->fd[MASTER]);
+    w->vacant = vacant(w); // else somebody else opened it meanwhile
+}
+
 static void leave(struct wire *w)
 {
-    pristine(w->fd[MASTER]);
-    w->vacant = true;
     wire_hangup(w);
-    // Opened again between the hang-up and here: the watch may have been read already.
-    struct pollfd again = {.fd = w->fd[MASTER], .events = POLLIN};
-    if (poll(&again, 1, 0) >= 0 && !(again.revents & POLLHUP))
-        w->vacant = false;
+    if (!vacant(w))
+        return; // opened again already: the line is the new client's
+    forget(w);
 }
 
 static bool pty_attend(struct wire *w, const struct pollfd *fds)
 {
-    char events[512];
-    if (fds[1].revents & POLLIN)
-        while (read(w->fd[WATCH], events, sizeof events) > 0) {
-            w->clients += w->vacant;
-            w->vacant = false;
-        }
+    if ((fds[1].revents & POLLIN) && somebody_opened(w)) {
+        w->clients += w->vacant;
+        w->vacant = false;
+    }
     if (w->vacant)
         return false;
     if (fds[0].revents & POLLIN)

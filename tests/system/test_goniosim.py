@@ -6,6 +6,7 @@ import math
 import os
 import re
 import select
+import shutil
 import signal
 import socket
 import subprocess
@@ -16,7 +17,7 @@ import pytest
 import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
-from conftest import BUILD, PATIENCE_S, Program
+from conftest import BUILD, PATIENCE_S, Program, control
 
 THETA_I, THETA_R, SAMPLE = 1, 2, 3
 MOVE, READY, HOME_END, ALARM = 1 << 13, 1 << 5, 1 << 4, 1 << 7
@@ -534,3 +535,54 @@ def test_two_benches_with_one_seed_see_the_same_numbers_at_the_start(start_sim, 
         d = detector(sim)
         monitors.append([d.ask("OAUX? 2") for _ in range(20)])
     assert monitors[0] == monitors[1] != monitors[2]
+
+
+def test_replies_that_nobody_read_do_not_meet_the_next_client(fast):
+    d = detector(fast)
+    before = fast.control(do="state")["wires"]["detector"]["frames_out"]
+    for _ in range(5):
+        d.send("SENS?")
+    wait_for(lambda: fast.control(do="state")["wires"]["detector"]["frames_out"] == before + 5, "replies sent")
+    d.port.close()
+    wait_for(lambda: not fast.control(do="state")["wires"]["detector"]["client"], "client gone")
+    fd = os.open(fast.folder / "detector", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    os.write(fd, b"OFLT?\r")
+    select.select([fd], [], [], PATIENCE_S)
+    assert os.read(fd, 100) == b"8\r"
+    os.close(fd)
+
+
+CLIENT_THAT_CLAIMS_AND_DIES = """
+import fcntl, os, signal, sys, termios
+fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+fcntl.ioctl(fd, termios.TIOCEXCL)
+os.write(fd, b"?\\r")
+assert os.read(fd, 1) == b"O"
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="starts programs as another user")
+def test_a_claim_of_a_client_that_died_is_forgotten(tmp_path):
+    """TIOCEXCL stays with a pty and keeps everybody out but root."""
+    nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    program = shutil.copy(BUILD / "goniosim", tmp_path)  # the build may lie where others may not look
+    for path in folder.parents:
+        if len(path.parts) > 2:
+            path.chmod(0o711)
+    folder.chmod(0o777)
+    sim = Program([*nobody, program, "--run-dir", folder, "--fast"], tmp_path / "sim.log")
+    try:
+        sim.wait_line("ready")
+        for _ in range(3):
+            done = subprocess.run([*nobody, "/usr/bin/python3", "-c", CLIENT_THAT_CLAIMS_AND_DIES, folder / "laser"],
+                                  capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+            assert done.returncode == -signal.SIGKILL, done.stderr
+            wait_for(lambda: not control(folder / "control.sock", do="state")["wires"]["laser"]["client"], "it left")
+            # The laser ignores what comes within 100 ms.
+            last = time.monotonic() + 0.1
+            wait_for(lambda: control(folder / "control.sock", do="state") and time.monotonic() > last, "a gap")
+    finally:
+        assert sim.end() == 0
