@@ -2,6 +2,7 @@
 #include "daemon/acquire.h"
 
 #include "campaign/bench.h"
+#include "campaign/plan.h"
 #include "campaign/store.h"
 
 #include <math.h>
@@ -11,32 +12,6 @@
 #define STEPS 30000.0     // a full scale has at least so many steps: what is below one is not known
 #define SAMPLE_TRIES 3    // for one answer that is not a number
 #define FALL_MOST 1e-5    // of a signal, that is waited out
-#define CORRELATION 0.05  // of neighbouring samples
-
-// Correlation of white noise behind n equal poles, x time constants apart.
-static double correlation(int poles, double x)
-{
-    switch (poles) {
-    case 1: return exp(-x);
-    case 2: return (1.0 + x) * exp(-x);
-    case 3: return (1.0 + x + x * x / 3.0) * exp(-x);
-    default: return (1.0 + x + 0.4 * x * x + x * x * x / 15.0) * exp(-x);
-    }
-}
-
-double acquire_spacing_s(double time_constant_s, int slope_db)
-{
-    const int poles = slope_db / 6;
-    double near = 0, far = 30;
-    for (int i = 0; i < 40; i++) { // bisection: it falls monotonically
-        const double x = 0.5 * (near + far);
-        if (correlation(poles, x) > CORRELATION)
-            near = x;
-        else
-            far = x;
-    }
-    return far * time_constant_s;
-}
 
 void acquire_begin(struct acquire *a)
 {
@@ -132,7 +107,7 @@ static int take_samples(struct instrument *in, const struct acquire *a, const st
                         const struct cancel *cancel, struct acquire_reading *r, struct gon_error *err)
 {
     const double full_v = instrument_full_scale_v(in, a->range);
-    const int64_t spacing_ns = CLK_S(acquire_spacing_s(instrument_time_constant_s(in),
+    const int64_t spacing_ns = CLK_S(plan_spacing_s(instrument_time_constant_s(in),
                                                        instrument_bench(in)->detector.slope_db));
     struct tally signal = {0}, monitor = {0};
     int64_t next_ns = 0;

@@ -5,7 +5,7 @@
 // Settling: until the residual of a step through n RC poles (detector_settle_s) is ACQUIRE_RESIDUAL of
 // the signal before; and when the first sample shows that the signal fell, until it is that much of the
 // new signal. It counts from the arrival (or the light's change) and from the change of range.
-// Spacing: white noise through n equal poles is correlated over x = t / time constant by
+// Spacing (plan_spacing_s): white noise through n equal poles is correlated over x = t / time constant by
 //   1: e^-x   2: (1 + x) e^-x   3: (1 + x + x^2/3) e^-x   4: (1 + x + 2x^2/5 + x^3/15) e^-x,
 // and the samples are spaced to a correlation of 0.05, where the sd of the mean of four taken as
 // independent is low by 5 %.
@@ -50,4 +50,3 @@ void acquire_begin(struct acquire *a);
 int acquire_attempt(struct instrument *in, struct acquire *a, const struct acquire_wish *wish,
                     const struct cancel *cancel, struct acquire_reading *ret_reading,
                     struct gon_error *err);
-double acquire_spacing_s(double time_constant_s, int slope_db);

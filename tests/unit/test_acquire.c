@@ -3,6 +3,7 @@
 #include "daemon/acquire.h"
 
 #include "base/units.h"
+#include "campaign/plan.h"
 #include "campaign/store.h"
 #include "tests/unit/simbench.h"
 #include "tests/unit/simconfig.h"
@@ -83,10 +84,10 @@ static void spacing_for_each_slope(void **state)
 {
     (void)state;
     // roots of the correlations in acquire.h at 0.05; the first is ln 20
-    assert_true(fabs(acquire_spacing_s(1, 6) - 2.995732) < 1e-5);
-    assert_true(fabs(acquire_spacing_s(1, 12) - 4.743865) < 1e-5);
-    assert_true(fabs(acquire_spacing_s(0.1, 12) - 0.4743865) < 1e-6);
-    assert_true(acquire_spacing_s(1, 18) > 4.8 && acquire_spacing_s(1, 24) > acquire_spacing_s(1, 18));
+    assert_true(fabs(plan_spacing_s(1, 6) - 2.995732) < 1e-5);
+    assert_true(fabs(plan_spacing_s(1, 12) - 4.743865) < 1e-5);
+    assert_true(fabs(plan_spacing_s(0.1, 12) - 0.4743865) < 1e-6);
+    assert_true(plan_spacing_s(1, 18) > 4.8 && plan_spacing_s(1, 24) > plan_spacing_s(1, 18));
 }
 
 // The simulated filter, which knows nothing of that formula: 20,000 samples, so the estimate of the
@@ -101,7 +102,7 @@ static void samples_so_spaced_are_correlated_by_a_twentieth(void **state)
         l.poles = poles;
         l.full_scale_v = 1e-5;
         const int steps = 40;
-        const double dt_s = acquire_spacing_s(1, 6 * poles) / steps;
+        const double dt_s = plan_spacing_s(1, 6 * poles) / steps;
         double before = 0, cross = 0, squares = 0;
         const int n = 20000;
         for (int i = 0; i < n; i++) {
@@ -158,7 +159,7 @@ static void the_next_reading_begins_in_the_range_of_the_last(void **state)
     const int64_t start_ns = s->b.clk.t_ns;
     assert_int_equal(reading(s, start_ns, &r), 1);
     const double s_taken = (double)(s->b.clk.t_ns - start_ns) * 1e-9;
-    assert_true(fabs(s_taken - detector_settle_s(0.1, 12, 1e-4) - 3 * acquire_spacing_s(0.1, 12)) < 1e-6);
+    assert_true(fabs(s_taken - detector_settle_s(0.1, 12, 1e-4) - 3 * plan_spacing_s(0.1, 12)) < 1e-6);
 }
 
 static void coming_down_a_steep_peak_is_waited_out(void **state)
