@@ -17,6 +17,7 @@ struct walk {
     double scale;    // q to z^2
     double quantile; // where the interval ends, in z
     const struct fit_optimum *best;
+    struct profile reached[FIT_PARAMS]; // by points within the limit, of whatever profile
 };
 
 static double outside(enum fit_param which, double x) // from x to the parameter
@@ -55,8 +56,18 @@ static bool hold(const struct walk *w, double value, struct fit_optimum *at, dou
     return true;
 }
 
+// What n, k and ks are at a point that the limit admits is within their own intervals too.
+static void note_reached(struct walk *w, const struct fit_optimum *at)
+{
+    for (int i = 0; i < FIT_PARAMS; i++) {
+        double value = outside((enum fit_param)i, at->x[i]);
+        w->reached[i].lo95 = fmin(w->reached[i].lo95, value);
+        w->reached[i].hi95 = fmax(w->reached[i].hi95, value);
+    }
+}
+
 // One end. z grows about linearly with the distance, so a secant on z, kept between what was bracketed.
-static bool find_end(const struct walk *w, double direction, double u, double *ret_end,
+static bool find_end(struct walk *w, double direction, double u, double *ret_end,
                      struct fit_optimum *ret_lowest)
 {
     double centre = outside(w->which, w->best->x[w->which]);
@@ -73,6 +84,8 @@ static bool find_end(const struct walk *w, double direction, double u, double *r
             return false;
         if (at.q < ret_lowest->q)
             *ret_lowest = at;
+        if (z <= w->quantile)
+            note_reached(w, &at);
         if (fabs(z - w->quantile) <= CLOSE * w->quantile) {
             *ret_end = centre + direction * distance;
             return true;
@@ -96,36 +109,56 @@ static bool find_end(const struct walk *w, double direction, double u, double *r
     return true;
 }
 
-bool profile_interval(const struct fit_set *set, const struct fit_space *space,
-                      const struct covariance *cov, enum fit_param which,
-                      struct fit_control *control, struct fit_optimum *best,
-                      struct profile *ret_profile, bool *ret_better)
+// u of the parameter itself, from its coordinate's.
+static double first_step(enum fit_param which, double x, double spread)
 {
-    double own = cov->c[which][which], value = outside(which, best->x[which]);
-    *ret_better = false;
-    *ret_profile = (struct profile){value, value};
-    if (cov->known[which])
+    return which == FIT_K ? sqrt(x + spread) - sqrt(x) : which == FIT_SIGMA ? exp(x) * spread : spread;
+}
+
+static bool one_interval(struct walk *w, struct fit_optimum *lowest, struct profile *ret_profile)
+{
+    double own = w->cov->c[w->which][w->which], x = w->best->x[w->which];
+    *ret_profile = (struct profile){outside(w->which, x), outside(w->which, x)};
+    if (w->cov->known[w->which] || own == 0) // fixed, or no noise at all: the value itself
         return true;
     if (isnan(own)) {
         *ret_profile = (struct profile){(double)NAN, (double)NAN};
         return true;
     }
-    struct walk w = {.set = set, .space = space, .cov = cov, .control = control, .which = which,
-                     .scale = cov->inverse[which][which] / own,
-                     .quantile = quantile_of(set, cov->dof), .best = best};
-    if (!(own > 0)) // no noise at all: the value itself
-        return true;
-    double spread = sqrt(own);
-    double u = which == FIT_K ? sqrt(best->x[which] + spread) - value
-             : which == FIT_SIGMA ? value * spread : spread;
+    double u = first_step(w->which, x, sqrt(own));
+    w->scale = w->cov->inverse[w->which][w->which] / own;
+    return find_end(w, -1, u, &ret_profile->lo95, lowest) &&
+           find_end(w, +1, u, &ret_profile->hi95, lowest);
+}
+
+bool profile_intervals(const struct fit_set *set, const struct fit_space *space,
+                       const struct covariance *cov, struct fit_control *control,
+                       struct fit_optimum *best, struct profile ret_profile[FIT_PARAMS],
+                       bool *ret_better)
+{
+    struct walk w = {.set = set, .space = space, .cov = cov, .control = control, .best = best,
+                     .quantile = quantile_of(set, cov->dof)};
     struct fit_optimum lowest = *best;
-    if (!find_end(&w, -1, u, &ret_profile->lo95, &lowest) ||
-        !find_end(&w, +1, u, &ret_profile->hi95, &lowest))
-        return false;
-    if (lowest.q < best->q * (1 - BETTER)) {
-        *ret_better = true;
-        *best = lowest;
-        return polish(set, space, 5 * STEPS, control, best);
+    *ret_better = false;
+    for (int i = 0; i < FIT_PARAMS; i++)
+        w.reached[i].lo95 = w.reached[i].hi95 = outside((enum fit_param)i, best->x[i]);
+    for (int i = 0; i < FIT_PARAMS; i++) {
+        w.which = (enum fit_param)i;
+        if (!one_interval(&w, &lowest, &ret_profile[i]))
+            return false;
+        if (lowest.q < best->q * (1 - BETTER)) {
+            *ret_better = true;
+            *best = lowest;
+            return polish(set, space, 5 * STEPS, control, best);
+        }
+    }
+    static const enum fit_param valley[] = {FIT_N, FIT_K, FIT_KS};
+    for (int i = 0; i < 3; i++) {
+        struct profile *p = &ret_profile[valley[i]];
+        if (isnan(p->lo95) || cov->known[valley[i]])
+            continue;
+        p->lo95 = fmin(p->lo95, w.reached[valley[i]].lo95);
+        p->hi95 = fmax(p->hi95, w.reached[valley[i]].hi95);
     }
     return true;
 }

@@ -161,12 +161,9 @@ static bool explore(const struct fit_set *set, const struct fit_space *space,
 {
     for (int round = 0; round < 4; round++) {
         bool better = false;
-        if (!covariance_at(set, space, top->x, control, cov))
+        if (!covariance_at(set, space, top->x, control, cov) ||
+            !profile_intervals(set, space, cov, control, top, profile, &better))
             return false;
-        for (int i = 0; i < FIT_PARAMS && !better; i++)
-            if (!profile_interval(set, space, cov, (enum fit_param)i, control, top, &profile[i],
-                                  &better))
-                return false;
         if (!better)
             break;
     }
