@@ -130,9 +130,14 @@ static void strangers_and_broken_frames_get_silence(void **state)
     uint8_t out[PORT_REPLY_MOST], f[64];
     struct plain *p = plain(false, MS(0.3));
     exchange(p, "08 03 00 00 00 01", "");
-    size_t n = bytes("07 03 00 00 00 01 00 00", f); // wrong CRC
-    port_feed(&p->m.port, f, n, MS(200));
-    assert_int_equal(port_take(&p->m.port, MS(300), out, NULL), 0);
+    size_t n = bytes("07 03 00 00 00 01", f);
+    uint16_t crc = sim_modbus_crc(f, n);
+    for (int wrong = 1; wrong < 4; wrong++) { // the one byte of the CRC, the other, both
+        f[n] = (uint8_t)((crc & 0xff) ^ (wrong & 1));
+        f[n + 1] = (uint8_t)((crc >> 8) ^ (wrong >> 1));
+        port_feed(&p->m.port, f, n + 2, MS(100 * wrong));
+        assert_int_equal(port_take(&p->m.port, MS(100 * wrong + 50), out, NULL), 0);
+    }
     p->t_ns = MS(400);
     exchange(p, "07 03 00 00 00 01", "07 03 02 00 00"); // and is well again
     exchange(p, "00 06 00 01 00 2A", ""); // broadcast: done, not answered
@@ -221,6 +226,8 @@ static void faults_of_a_link_lose_and_delay_replies(void **state)
     exchange(p, "00 03 00 00 00 06 07 03 00 02 00 01", "");
     assert_int_equal(port_take(&p->m.port, p->t_ns + MS(249), out, NULL), 0);
     assert_int_equal(port_take(&p->m.port, p->t_ns + MS(250), out, NULL), 11);
+    p->t_ns += MS(300);
+    exchange(p, "00 03 00 00 00 06 07 03 00 02 00 01", "00 03 00 00 00 05 07 03 02 00 63"); // only once
     p->m.port.mute = true;
     exchange(p, "00 04 00 00 00 06 07 03 00 02 00 01", "");
     assert_int_equal(p->m.port.lost, 2);
