@@ -66,19 +66,28 @@ static void bar(double part, char *text)
         strcat(text, i < (int)(part * BAR + 0.5) ? "█" : "░");
 }
 
+static void where(const json_t *e, char *text, size_t size)
+{
+    int sweep = whole(e, "sweep"), sweeps = whole(e, "sweeps");
+    if (sweep >= 1 && sweep <= sweeps)
+        snprintf(text, size, "sweep %d/%d θi=%g°", sweep, sweeps, number(e, "theta_i_deg"));
+    else
+        snprintf(text, size, "dark and beam");
+}
+
 // The live line. It is short enough for 110 columns; a narrower terminal loses its end.
 static void show_reading(struct follow *f, const json_t *e)
 {
-    char filled[BAR * 4 + 1], left[40], value[60] = "", line[400];
-    double part = whole(e, "points") > 0 ? (double)whole(e, "point") / whole(e, "points") : 0;
+    char filled[BAR * 4 + 1], left[40], value[60] = "", sweep[60], line[400];
+    double part = whole(e, "total") > 0 ? (double)whole(e, "done") / whole(e, "total") : 0;
     double f_r = number(e, "f_r_per_sr"), u = number(e, "u_f_r_per_sr");
     bar(part, filled);
     time_left(number(e, "left_s"), left, sizeof left);
     if (isfinite(f_r))
         snprintf(value, sizeof value, "f_r %.4g ±%.1g /sr", f_r, u);
-    int n = snprintf(line, sizeof line, "sweep %d/%d θi=%g°  %s %3.0f%%  θr %7.2f°  %s   %s   laser %s",
-                     whole(e, "sweep"), whole(e, "sweeps"), number(e, "theta_i_deg"), filled, 100 * part,
-                     number(e, "theta_r_deg"), value, left,
+    where(e, sweep, sizeof sweep);
+    int n = snprintf(line, sizeof line, "%s  %s %3.0f%%  θr %7.2f°  %s   %s   laser %s", sweep, filled,
+                     100 * part, number(e, "theta_r_deg"), value, left,
                      json_is_true(json_object_get(e, "emission")) ? "ON" : "off");
     int columns = out_columns(stderr), seen = 0;
     for (int i = 0; i < n; i++)
@@ -96,7 +105,7 @@ static void show_sweep(struct follow *f, const json_t *e)
     time_left(number(e, "left_s"), left, sizeof left);
     if (!f->live)
         fprintf(stderr, "sweep %d/%d  theta_i %g deg  %d of %d readings  %s\n", whole(e, "sweep"),
-                whole(e, "sweeps"), number(e, "theta_i_deg"), whole(e, "point"), whole(e, "points"), left);
+                whole(e, "sweeps"), number(e, "theta_i_deg"), whole(e, "done"), whole(e, "total"), left);
 }
 
 static void show_state(struct follow *f, const json_t *e)

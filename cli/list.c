@@ -44,7 +44,7 @@ static void print_json(const struct catalog_entry *e, int count)
 {
     json_t *all = json_array();
     for (int i = 0; i < count; i++, e++) {
-        json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i}", "run", e->id, "name", e->name,
+        json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i}", "id", e->id, "name", e->name,
                               "sample", e->sample, "state", e->state, "problem", e->problem, "file", e->path,
                               "done", e->done, "total", e->total, "writer_pid", e->writer_pid);
         json_object_set_new(o, "created_utc", utc(e->created_utc_ms));
@@ -52,9 +52,8 @@ static void print_json(const struct catalog_entry *e, int count)
         json_object_set_new(o, "finished_utc", utc(e->finished_utc_ms));
         json_array_append_new(all, o);
     }
-    json_t *o = json_pack("{s:o}", "runs", all);
-    out_json(o);
-    json_decref(o);
+    out_json(all);
+    json_decref(all);
 }
 
 static void print_table(const struct catalog_entry *e, int count)

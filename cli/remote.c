@@ -110,7 +110,7 @@ static void print_run(const json_t *r)
     const char *text = text_of(r, "text");
     printf("run %d    %s (%s)%s%s\n", whole(r, "run"), text_of(r, "state"), text_of(r, "name"), *text ? ": " : "", text);
     printf("progress  sweep %d of %d, %d of %d readings", whole(r, "sweep"), whole(r, "sweeps"),
-           whole(r, "point"), whole(r, "points"));
+           whole(r, "done"), whole(r, "total"));
     put_number(r, "left_s", ", ", 0, "s left");
     const json_t *f = json_object_get(r, "f_r_per_sr");
     if (json_is_number(f)) {
@@ -204,37 +204,3 @@ static int run_pause(const struct verb *verb, int argc, char **argv)
 const struct verb verb_pause = {
     "pause", "", "hold the run, laser off, until gonio resume",
     "Holds the run that has the bench after the reading in progress: laser off, axes still.\n", rows, run_pause};
-
-// The run's number when the text is one, else the file's path as the daemon will need it.
-static json_t *what_to_resume(const char *text)
-{
-    char *end, path[4096];
-    long id = strtol(text, &end, 10);
-    if (!*end && end != text)
-        return json_pack("{s:I}", "resume", (json_int_t)id);
-    return json_pack("{s:s}", "resume", realpath(text, path) ? path : text);
-}
-
-static int run_resume(const struct verb *verb, int argc, char **argv)
-{
-    struct options o = {0};
-    const char *operands[1];
-    int status = EXIT_OK, count = verb_take(verb, argc, argv, &o, operands, 0, 1);
-    if (count < 0)
-        return EXIT_INPUT;
-    json_t *body = count ? what_to_resume(operands[0]) : NULL;
-    json_t *reply = remote_call(&o.remote, "POST", count ? "/api/v1/runs" : "/api/v1/resume", body, &status);
-    if (reply && o.remote.json)
-        out_json(reply);
-    if (reply)
-        fprintf(stderr, "run %d goes on. Watch it: gonio watch\n", whole(reply, "run"));
-    json_decref(reply);
-    json_decref(body);
-    return status;
-}
-
-const struct verb verb_resume = {
-    "resume", "[RUN]", "go on with a paused run, or with RUN where it was stopped",
-    "Without RUN, goes on with the run that is paused. RUN is a number that gonio list shows, or a campaign\n"
-    "file: it is queued again and goes on with its first point that has no accepted reading.\n",
-    rows, run_resume};

@@ -45,6 +45,21 @@ static int follow(const struct remote_options *o, const json_t *run, const json_
     return status;
 }
 
+// Says that a run is under way and follows it unless that is not wanted. Takes the reply.
+static int begun(const struct options *o, json_t *reply, const char *what)
+{
+    int status = EXIT_OK;
+    if (o->remote.json && o->detach)
+        out_json_line(reply);
+    else if (!o->remote.json)
+        fprintf(stderr, "run %d %s%s\n", (int)json_integer_value(json_object_get(reply, "run")), what,
+                o->detach ? ". Watch it: gonio watch" : "");
+    if (!o->detach)
+        status = follow(&o->remote, reply, json_object_get(reply, "event_id"));
+    json_decref(reply);
+    return status;
+}
+
 static int run_run(const struct verb *verb, int argc, char **argv)
 {
     struct options o = {0};
@@ -60,15 +75,7 @@ static int run_run(const struct verb *verb, int argc, char **argv)
     json_decref(body);
     if (!reply)
         return status ? status : EXIT_FAILED;
-    if (o.remote.json && o.detach)
-        out_json_line(reply);
-    else if (!o.remote.json)
-        fprintf(stderr, "run %d started%s\n", (int)json_integer_value(json_object_get(reply, "run")),
-                o.detach ? ". Watch it: gonio watch" : "");
-    if (!o.detach)
-        status = follow(&o.remote, reply, json_object_get(reply, "event_id"));
-    json_decref(reply);
-    return status;
+    return begun(&o, reply, "started");
 }
 
 const struct verb verb_run = {
@@ -101,3 +108,35 @@ const struct verb verb_watch = {
     "watch", "", "follow the run that has the bench",
     "Shows the progress of the active run until its end. Ctrl-C stops watching; the run goes on.\n",
     watch_rows, run_watch};
+
+// --- resume ---------------------------------------------------------------------------------------
+
+// The run's number when the text is one, else the file's path as the daemon will need it.
+static json_t *what_to_resume(const char *text)
+{
+    char *end, path[4096];
+    long id = strtol(text, &end, 10);
+    if (!*end && end != text)
+        return json_pack("{s:I}", "resume", (json_int_t)id);
+    return json_pack("{s:s}", "resume", realpath(text, path) ? path : text);
+}
+
+static int run_resume(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    const char *operand;
+    int status = EXIT_OK, count = verb_take(verb, argc, argv, &o, &operand, 0, 1);
+    if (count < 0)
+        return EXIT_INPUT;
+    json_t *body = count ? what_to_resume(operand) : NULL;
+    json_t *reply = remote_call(&o.remote, "POST", count ? "/api/v1/runs" : "/api/v1/resume", body, &status);
+    json_decref(body);
+    return reply ? begun(&o, reply, "goes on") : status;
+}
+
+const struct verb verb_resume = {
+    "resume", "[RUN]", "go on with a paused run, or with RUN where it was stopped",
+    "Without RUN, goes on with the run that is paused. RUN is a number that gonio list shows, or a campaign\n"
+    "file: it is queued again and goes on with its first point that has no accepted reading. Follows it as\n"
+    "gonio run does.\n",
+    run_rows, run_resume};

@@ -93,6 +93,7 @@ static struct http_reply get_status(const struct call *c)
                           (int)getpid(), "simulator", s.simulator, "seed", (json_int_t)s.seed, "uptime_s",
                           s.uptime_s, "directory", s.directory, "event_id", (json_int_t)s.event_id,
                           "last_error", s.last_error, "queued", queued);
+    json_object_set_new(o, "state", json_string(active ? run_state_name(active->state) : "idle"));
     json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
     json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
     return reply(200, view_text(o));
@@ -177,7 +178,7 @@ static struct http_reply told(const struct call *c, int run, const struct gon_er
 {
     if (run < 0)
         return failed(err);
-    return reply(202, view_text(view_run(queue_run(hub_queue(c->hub), run), false)));
+    return reply(202, hub_submitted(c->hub, run));
 }
 
 static struct http_reply post_pause(const struct call *c)

@@ -99,8 +99,10 @@ static void happened(struct hub *h, const struct note *n)
         json_object_set_new(o, "text", json_string(n->text ? n->text : ""));
         log_say(h->options.log, LOG_NOTICE, "run", "%d: %s", n->run, n->text ? n->text : "");
     } else if (n->event.kind == ENGINE_READING) {
-        log_say(h->options.log, LOG_INFO, "reading", "run %d point %d/%d theta_i %g theta_r %g deg f_r %.5g /sr",
-                n->run, run->point, run->points, run->theta_i_deg, run->theta_r_deg, run->f_per_sr);
+        json_object_set_new(o, "sweep", json_integer(n->sweep)); // the plan's own names for it
+        json_object_set_new(o, "point", json_integer(n->point));
+        log_say(h->options.log, LOG_INFO, "reading", "run %d, %d of %d, theta_i %g theta_r %g deg, f_r %.5g /sr",
+                n->run, run->done, run->total, run->theta_i_deg, run->theta_r_deg, run->f_per_sr);
     } else {
         log_say(h->options.log, LOG_NOTICE, "run", "%d: sweep %d of %d", n->run, run->sweep, run->sweeps);
     }

@@ -52,5 +52,5 @@ void hub_stop(struct hub *h, const char *why, uint64_t ticket);
 int hub_pause(struct hub *h, struct gon_error *err);  // the run that has the bench: its id
 int hub_resume(struct hub *h, struct gon_error *err); // the paused run: its id
 
-// The answer to a request that queued a run: status 201.
+// A run with the id of the event after which it can be followed, as JSON text.
 char *hub_submitted(const struct hub *h, int run);

@@ -35,7 +35,7 @@ enum note_kind {
     NOTE_OPENED,   // run, thing: struct run_material; NULL: err
     NOTE_FITTED,   // run, sweep, last, text: JSON; NULL: err
     NOTE_CLOSED,   // run, err
-    NOTE_HAPPENED, // run, event, text
+    NOTE_HAPPENED, // run, event, text; sweep and point: of the last stored reading
     NOTE_FIT_ASKED, // run, sweep, last
     NOTE_ENDED,    // run, state, err
     NOTE_SNAPSHOT, // thing: struct instrument_snapshot
@@ -44,7 +44,7 @@ enum note_kind {
 
 struct note {
     struct letter letter; // kind: note_kind
-    int run, sweep;
+    int run, sweep, point;
     bool last;
     uint64_t ticket, sequence;
     enum run_state state;

@@ -206,8 +206,8 @@ void queue_engine_event(struct queue *q, int id, const struct engine_event *even
     run->left_s = event->left_s;
     run->sweeps = event->sweeps;
     run->sweep = event->sweep;
-    run->point = event->point;
-    run->points = event->points;
+    run->done = event->point;
+    run->total = event->points;
     if (event->kind == ENGINE_READING) {
         run->theta_i_deg = event->theta_i_deg;
         run->theta_r_deg = event->theta_r_deg;

@@ -21,7 +21,7 @@ struct run {
     enum run_state state;
     char text[480];      // why it is paused, stopped or failed; "" otherwise
     int sweep, sweeps;   // 0 while preparing
-    int point, points;   // done and all
+    int done, total;     // points
     double theta_i_deg, theta_r_deg, f_per_sr, u_per_sr; // of the last reading; NAN before there is one
     unsigned flags;
     double left_s;       // NAN unknown

@@ -155,6 +155,8 @@ static void publish_port(void *ctx, const struct engine_event *event)
     n->event = *event;
     n->text = note_text(event->text);
     n->event.text = n->text;
+    n->sweep = r->reading.sweep;
+    n->point = r->reading.point;
     note_post(r->links.to_main, n);
 }
 

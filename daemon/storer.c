@@ -68,7 +68,7 @@ static struct run *run_of(const struct catalog_entry *e)
     struct run *run = calloc(1, sizeof *run);
     if (!run)
         return NULL;
-    *run = (struct run){.id = e->id, .state = state_of(e->state), .point = e->done, .points = e->total,
+    *run = (struct run){.id = e->id, .state = state_of(e->state), .done = e->done, .total = e->total,
                         .theta_i_deg = NAN, .theta_r_deg = NAN, .f_per_sr = NAN, .u_per_sr = NAN,
                         .left_s = NAN};
     snprintf(run->path, sizeof run->path, "%s", e->path);

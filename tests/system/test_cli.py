@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: MIT
+"""The verbs that need no daemon: help, check, plan, fit, list, and what a wrong command line gets."""
+import csv
+import io
+import json
+import math
+
+import pytest
+
+from conftest import ROOT, SMALL, gonio
+
+GOLDEN = ROOT / "tests" / "golden"
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+def test_help_names_every_verb():
+    r = gonio("help")
+    assert r.returncode == 0 and r.stderr == ""
+    verbs = [line.split()[0] for line in r.stdout.splitlines() if line.startswith("  ")]
+    assert verbs == ["plan", "run", "watch", "status", "stop", "pause", "resume", "list", "show", "fit", "check"]
+    for verb in verbs:
+        r = gonio("help", verb)
+        assert r.returncode == 0 and f"usage: gonio {verb}" in r.stdout
+        assert gonio(verb, "--help").stdout == r.stdout
+
+
+def test_version():
+    assert gonio("--version").stdout.startswith("gonio 0.")
+
+
+@pytest.mark.parametrize("args, says", [
+    ([], "usage: gonio VERB"),
+    (["plna"], "did you mean 'plan'?"),
+    (["frobnicate"], "no verb 'frobnicate'; gonio help lists all"),
+    (["plan"], "needs CAMPAIGN.cfg; see: gonio help plan"),
+    (["plan", "a.cfg", "b.cfg"], "'b.cfg' is one argument too many"),
+    (["fit", "--sed", "1"], "did you mean '--seed'?"),
+    (["fit", "x.csv", "--threads", "0"], "--threads 0 is out of range; allowed 1..64"),
+    (["help", "statsu"], "did you mean 'status'?"),
+])
+def test_wrong_command_lines_say_what_was_meant(args, says):
+    r = gonio(*args)
+    assert r.returncode == 2 and says in r.stderr and r.stdout == ""
+
+
+def test_plan_of_the_paper():
+    r = gonio("plan", ROOT / "configs" / "paper.cfg", "--json")
+    assert r.returncode == 0, r.stderr
+    plan = json.loads(r.stdout)
+    assert plan["sample_points"] == 850 and plan["sweep_count"] == 10
+    assert [s["theta_i_deg"] for s in plan["sweeps"]] == [0, 5, 10, 20, 30, 40, 45, 50, 55, 60]
+    dense = [p["theta_r_deg"] for p in plan["order"] if p["sweep"] == 10 and p["dense"]]
+    assert len(dense) == 21 and min(dense) == 55 and max(dense) == 65
+    assert plan["duration_s"] is None
+    kinds = [p["kind"] for p in plan["order"]]
+    assert kinds[:2] == ["dark", "beam"] and kinds[-2:] == ["beam", "dark"]
+
+
+def test_plan_is_a_table_in_a_pipe():
+    r = gonio("plan", ROOT / "configs" / "paper.cfg")
+    assert r.returncode == 0
+    rows = [line.split("\t") for line in r.stdout.splitlines()]
+    assert rows[0][:4] == ["sweep", "theta_i_deg", "points", "dense"] and len(rows) == 11
+    assert sum(int(row[2]) for row in rows[1:]) == 850
+    assert "850 points" in r.stderr and "gonio run" in r.stderr
+    assert "\033" not in r.stdout + r.stderr
+
+
+BAD = """\
+campaign: {
+  name = "bad";
+  theta_r: { from_deg = -85; to_deg = 85; stpe_deg = 2.5; };
+  theta_i_deg = [ 0.0, 5.0, 95.0 ];
+};
+"""
+
+
+def test_mistakes_name_file_and_line(tmp_path):
+    bad = write(tmp_path / "bad.cfg", BAD)
+    for verb in ("plan", "check", "run"):
+        r = gonio(verb, bad)
+        assert r.returncode == 2 and r.stdout == ""
+        assert f"{bad}:3: unknown setting 'stpe_deg'" in r.stderr and "did you mean 'step_deg'?" in r.stderr
+        assert f"{bad}:4: campaign.theta_i_deg[2] = 95" in r.stderr
+        assert "errors, " in r.stderr
+    r = gonio("check", bad, "--json")
+    report = json.loads(r.stdout)
+    assert r.returncode == 2 and len(report["errors"]) >= 2
+
+
+def test_files_that_are_not_there(tmp_path):
+    for args in (["plan", tmp_path / "no.cfg"], ["check", tmp_path], ["fit", tmp_path / "no.csv"],
+                 ["show", tmp_path / "no.gonio"], ["show", "77"], ["check", "/dev/null"]):
+        r = gonio(*args, env={"GONIO_DIR": str(tmp_path)})
+        assert r.returncode == 2 and r.stderr.strip(), (args, r)
+
+
+def test_check_knows_campaign_and_bench(tmp_path):
+    good = write(tmp_path / "small.cfg", SMALL)
+    r = gonio("check", good)
+    assert r.returncode == 0 and "a good campaign file" in r.stderr
+    assert json.loads(gonio("check", good, "--json").stdout) == {"file": str(good), "kind": "campaign", "errors": []}
+    bench = write(tmp_path / "b.cfg", "bench: { name = 1; };\n")
+    r = gonio("check", bench)
+    assert r.returncode == 2 and "b.cfg:1" in r.stderr
+    for kind in ("campaign", "bench"):
+        r = gonio("check", "--settings", kind)
+        assert r.returncode == 0 and len(r.stdout) > 500
+    assert gonio("check", "--settings", "x").returncode == 2
+
+
+def fit_json(*args):
+    r = gonio("fit", *args, "--json")
+    assert r.returncode == 0, r.stderr
+    return json.loads(r.stdout)
+
+
+def optimum(name, weighting):
+    text = "".join(l for l in open(GOLDEN / "golden_fit_optima.csv") if not l.startswith("#"))
+    for row in csv.DictReader(io.StringIO(text)):
+        if row["file"] == name and row["weighting"] == weighting:
+            return {k: float(v) for k, v in row.items() if k.startswith(("best", "delta", "true"))}
+    raise KeyError(name)
+
+
+def test_fit_finds_the_reference_optimum():
+    best = optimum("golden_fit_a.csv", "g1")
+    f = fit_json(GOLDEN / "golden_fit_a.csv", "--seed", "3", "--weights", "uniform")
+    assert f["points"] == 841 and f["weights"] == "uniform" and f["method"] == "memetic" and f["seed"] == 3
+    assert f["delta"] <= best["delta_best"] * 1.001
+    assert math.isclose(f["params"]["sigma"]["value"], best["best_sigma"], rel_tol=1e-3)
+    assert math.isclose(f["params"]["kd"]["value"], best["best_kd"], rel_tol=1e-2)
+    assert set(f) >= {"method", "weights", "points", "seed", "delta", "params", "derived", "correlation",
+                      "chi2_per_dof", "evaluations", "elapsed_ms", "elapsed_total_ms", "warnings"}
+    for name in ("n", "k", "sigma", "ks", "kd"):
+        assert set(f["params"][name]) == {"value", "u", "lo95", "hi95", "identified", "at_bound"}
+    assert set(f["derived"]) == {"ks_r0", "ks_r45", "dhr_0", "dhr_45", "dhr_60"}
+    assert len(f["correlation"]) == 5 and all(len(row) == 5 for row in f["correlation"])
+    assert f["params"]["sigma"]["identified"] and not f["params"]["k"]["identified"]
+    assert any("n" in w for w in f["warnings"])
+    assert fit_json(GOLDEN / "golden_fit_a.csv", "--seed", "3")["params"] == f["params"]
+
+
+def test_fit_speaks_to_people():
+    r = gonio("fit", GOLDEN / "golden_fit_a.csv")
+    assert r.returncode == 0
+    rows = {row[0]: row for row in (line.split("\t") for line in r.stdout.splitlines())}
+    assert set(rows) >= {"parameter", "n", "k", "sigma", "ks", "kd", "ks*R(0)", "ks*R(45)", "DHR(0)", "Delta"}
+    assert "not identified" in rows["k"][5] and rows["sigma"][5] == ""
+    assert abs(float(rows["sigma"][1]) - 0.15) < 0.001 and float(rows["sigma"][2]) > 0
+    assert "841 points" in r.stderr and "warning: " in r.stderr
+
+
+def test_fit_options_change_the_fit(tmp_path):
+    data = GOLDEN / "golden_fit_a.csv"
+    best = optimum("golden_fit_a.csv", "g3")
+    assert fit_json(data, "--weights", "dense:3")["delta"] <= best["delta_best"] * 1.001
+    few = fit_json(data, "--theta-i-max", "30")
+    assert few["points"] < 841
+    assert fit_json(data, "--theta-i", "0,10,30")["points"] < few["points"]
+    tight = fit_json(data, "--bounds", "sigma=0.2:0.3")
+    assert tight["params"]["sigma"]["at_bound"] and tight["params"]["sigma"]["value"] == 0.2
+    trace = tmp_path / "trace.csv"
+    fit_json(data, "--trace", trace, "--theta-i-max", "10")
+    lines = trace.read_text().splitlines()
+    assert lines[0] == "generation,best_delta,mean_delta" and len(lines) > 2
+    lambert = fit_json(data, "--diffuse", "lambert", "--theta-i-max", "20")
+    assert lambert["params"]["kd"]["value"] > 0.1  # kd/pi instead of kd/cos
+
+
+@pytest.mark.parametrize("text, says", [
+    ("theta_i_deg,theta_r_signed_deg,f_r\n0,1,0\n0,2,0\n", "zero"),
+    ("theta_i_deg,theta_r_signed_deg,f_r\n0,1,0.1\n0,2,nan\n", ":3"),
+    ("theta_i_deg,theta_r_signed_deg,f_r\n0,1,0.1\n0,2\n", ":3"),
+    ("theta_i_deg,theta_r_signed_deg,f_r\n0,1,\n", ":2"),
+    ("theta_i_deg,theta_r_signed_deg,f_r\n0,95,1\n", ":2"),
+    ("theta_i_deg,theta_r_signed,f_r\n0,5,1\n", "theta_r"),
+    ("theta_i_deg,theta_r_signed_deg,f_r\n0,5,1\n0,6,1\n", "points"),
+    ("", ""),
+])
+def test_fit_refuses_what_is_not_data(tmp_path, text, says):
+    path = write(tmp_path / "d.csv", text)
+    r = gonio("fit", path)
+    assert r.returncode == 2 and "d.csv" in r.stderr and says in r.stderr, r.stderr
+    assert r.stdout == ""
+
+
+@pytest.mark.parametrize("args, says", [
+    (["--weights", "unifrom"], "did you mean 'uniform'"),
+    (["--method", "magic"], "allowed: memetic, paper"),
+    (["--bounds", "n=3:1"], "is empty"),
+    (["--weights", "variance"], ""),
+    (["--column", "nothing"], "nothing"),
+    (["--theta-i", "91"], "0..90"),
+    (["--theta-i", "1"], ""),
+])
+def test_fit_refuses_wrong_options(args, says):
+    r = gonio("fit", GOLDEN / "golden_fit_a.csv", *args)
+    assert r.returncode == 2 and says in r.stderr and r.stdout == "", r
+
+
+def test_no_daemon_is_status_3_and_says_how_to_start_one(tmp_path):
+    env = {"GONIO_SOCKET": str(tmp_path / "none.sock")}
+    good = write(tmp_path / "small.cfg", SMALL)
+    for args in (["status"], ["stop"], ["pause"], ["resume"], ["resume", "3"], ["watch"], ["run", good]):
+        r = gonio(*args, env=env)
+        assert r.returncode == 3 and "goniod --sim" in r.stderr and str(tmp_path) in r.stderr, (args, r)
+        assert r.stdout == ""
+
+
+def test_list_of_an_empty_folder(tmp_path):
+    r = gonio("list", "--dir", tmp_path)
+    assert r.returncode == 0 and r.stdout == "" and "no campaigns" in r.stderr
+    assert json.loads(gonio("list", "--dir", tmp_path, "--json").stdout) == []

@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: MIT
+"""goniod over the simulated bench: a campaign from its start to its fit, stop and resume, ends."""
+import json
+import math
+import os
+import signal
+import sqlite3
+import subprocess
+import time
+
+import pytest
+
+from conftest import BUILD, PATIENCE_S, SMALL, Program, gonio
+
+POINTS = 3 * 33 + 4  # see SMALL; two dark and two beam readings
+
+
+@pytest.fixture(scope="module")
+def finished(daemon, tmp_path_factory):
+    """A small campaign, run to its end with gonio run --json: its events."""
+    config = tmp_path_factory.mktemp("c") / "small.cfg"
+    config.write_text(SMALL)
+    r = daemon.gonio("run", config, "--json")
+    events = [json.loads(line) for line in r.stdout.splitlines()]
+    return {"status": r.returncode, "events": events, "stderr": r.stderr, "run": events[0]["run"]}
+
+
+def test_a_campaign_runs_to_its_end(daemon, finished):
+    assert finished["status"] == 0, finished["stderr"]
+    states = [e["state"] for e in finished["events"] if e["event"] == "state"]
+    assert states[0] == "queued" and states[-1] == "done" and "running" in states
+    readings = [e for e in finished["events"] if e["event"] == "reading"]
+    assert readings[-1]["done"] == readings[-1]["total"]
+    sample = [e for e in readings if e["f_r_per_sr"] is not None]
+    assert len(sample) > 90 and all(e["f_r_per_sr"] > 0 for e in sample)
+    assert any(e["emission"] for e in readings)
+    fits = [e for e in finished["events"] if e["event"] == "fit"]
+    assert [e["last"] for e in fits].count(True) == 1 and "fit" in fits[-1]
+    assert daemon.status()["run"] is None
+    state = daemon.sim_control(do="state")
+    assert "true" not in json.dumps(state.get("laser", state).get("emission", False)).lower()
+
+
+def test_ids_rise_and_every_event_names_its_run(finished):
+    ids = [e["id"] for e in finished["events"]]
+    assert ids == sorted(set(ids))
+    assert all(e["run"] == finished["run"] for e in finished["events"])
+
+
+def test_the_fit_matches_the_simulated_sample(daemon, finished):
+    truth = daemon.sim_control(do="truth")
+    truth = truth.get("sample", truth)
+    fit = [e for e in finished["events"] if e["event"] == "fit"][-1]["fit"]
+    sigma = fit["params"]["sigma"]
+    # Identified by f_00 alone (physics): sigma and kd. Five standard uncertainties, and never more than 5 %.
+    assert abs(sigma["value"] - truth["sigma"]) < max(5 * sigma["u"], 0.01 * truth["sigma"])
+    assert math.isclose(sigma["value"], truth["sigma"], rel_tol=0.05)
+    assert math.isclose(fit["params"]["kd"]["value"], truth["kd"], rel_tol=0.05)
+
+
+def test_list_and_show_read_the_file(daemon, finished):
+    runs = json.loads(daemon.gonio("list", "--json").stdout)
+    (run,) = [r for r in runs if r["id"] == finished["run"]]
+    assert run["state"] == "done" and run["done"] == run["total"] and run["name"] == "small"
+    assert run["created_utc"] and run["finished_utc"]
+    assert not os.path.exists(run["file"] + "-wal")
+    shown = json.loads(daemon.gonio("show", finished["run"], "--json").stdout)
+    assert shown["state"] == "done" and shown["fit"]["params"]["sigma"]["identified"]
+    by_path = json.loads(daemon.gonio("show", run["file"], "--sweep", 1, "--json").stdout)["readings"]
+    by_name = json.loads(daemon.gonio("show", "small", "--sweep", 1, "--json").stdout)["readings"]
+    assert by_path == by_name and len(by_path) >= 25
+    assert all(r["accepted"] for r in by_path if r["f_r_per_sr"] is not None)
+    assert all(r["u_a_per_sr"] > 0 and r["u_b_per_sr"] > 0 for r in by_path if r["f_r_per_sr"] is not None)
+    table = daemon.gonio("show", finished["run"], "--sweep", 1).stdout.splitlines()
+    assert table[0].split("\t")[:4] == ["kind", "theta_i_deg", "theta_r_deg", "f_r_per_sr"]
+    assert len(table) == len(by_path) + 1
+    assert daemon.gonio("show", finished["run"]).returncode == 0
+    assert daemon.gonio("show", finished["run"], "--sweep", 99).returncode == 2
+    with sqlite3.connect(f"file:{run['file']}?mode=ro", uri=True) as db:
+        assert db.execute("select count(*) from reading_brdf").fetchone()[0] >= 90
+
+
+def test_fit_of_the_file_is_the_daemons_fit(daemon, finished):
+    stored = [e for e in finished["events"] if e["event"] == "fit"][-1]["fit"]
+    r = daemon.gonio("fit", finished["run"], "--json")
+    assert r.returncode == 0, r.stderr
+    again = json.loads(r.stdout)
+    assert again["points"] == stored["points"] and again["weights"] == stored["weights"]
+    assert math.isclose(again["params"]["sigma"]["value"], stored["params"]["sigma"]["value"], rel_tol=1e-9)
+
+
+def test_a_run_that_is_done_is_not_resumed(daemon, finished):
+    r = daemon.gonio("resume", finished["run"])
+    assert r.returncode == 4 and "is done" in r.stderr
+    r = daemon.gonio("resume", 999)
+    assert r.returncode == 2 and "999" in r.stderr
+
+
+def test_the_stream_replays_what_was_missed(daemon, finished):
+    ids = [e["id"] for e in finished["events"]]
+    stream = daemon.follow(last_id=ids[10])
+    replayed = [stream.next() for _ in range(len(ids) - 11)]
+    stream.close()
+    assert replayed == finished["events"][11:]
+
+
+def test_run_for_people_ends_with_the_parameters(daemon, tmp_path):
+    config = tmp_path / "tiny.cfg"
+    config.write_text(SMALL.replace("0.0, 20.0, 40.0", "10.0, 30.0, 50.0").replace('"small"', '"tiny"'))
+    r = daemon.gonio("run", config)
+    assert r.returncode == 0, r.stderr
+    assert "sweep 1/3" in r.stderr and "sweep 3/3" in r.stderr and "started" in r.stderr
+    assert ".gonio" in r.stderr
+    rows = {line.split("\t")[0] for line in r.stdout.splitlines()}
+    assert rows >= {"n", "k", "sigma", "ks", "kd", "ks*R(0)", "Delta"}
+    assert "\033" not in r.stdout + r.stderr
+
+
+LONG = SMALL.replace("step_deg = 5.0", "step_deg = 1.0").replace('"small"', '"long"')
+
+
+def test_stop_and_resume_measure_no_point_twice(daemon):
+    reply = daemon.submit(LONG, "long.cfg")
+    run = reply["run"]
+    stream = daemon.follow(reply["event_id"])
+    stream.until(lambda e: e["event"] == "reading" and e["done"] >= 20)
+    busy = daemon.gonio("resume", run)
+    assert busy.returncode == 4 and "already" in busy.stderr
+    began = time.monotonic()
+    r = daemon.gonio("stop")
+    assert r.returncode == 0 and f"gonio resume {run}" in r.stderr
+    assert time.monotonic() - began < 3.0  # laser off within 1 s, then the file is closed
+    stream.until_state(run, "stopped")
+    assert daemon.status()["run"] is None
+    devices = {d["name"]: d for d in daemon.status()["devices"]}
+    assert devices["laser"]["emission"] is False
+    (entry,) = [e for e in json.loads(daemon.gonio("list", "--json").stdout) if e["id"] == run]
+    assert entry["state"] == "stopped" and 20 <= entry["done"] < entry["total"]
+
+    r = daemon.gonio("resume", run, "--detach", "--json")
+    assert r.returncode == 0, r.stderr
+    stream.until(lambda e: e["event"] == "reading" and e["done"] > entry["done"])
+    stream.until_state(run, "done", patience_s=90)
+    stream.close()
+    with sqlite3.connect(f"file:{reply['file']}?mode=ro", uri=True) as db:
+        rows = db.execute("select sweep, point, flags from reading").fetchall()
+        plan = db.execute("select count(*) from plan").fetchone()[0]
+    accepted = [(s, p) for s, p, flags in rows if flags == 0]
+    assert len(accepted) == len(set(accepted)) == plan == entry["total"]
+
+
+def test_pause_holds_and_resume_goes_on(daemon):
+    reply = daemon.submit()
+    run = reply["run"]
+    stream = daemon.follow(reply["event_id"])
+    stream.until(lambda e: e["event"] == "reading" and e["done"] >= 5)
+    r = daemon.gonio("pause")
+    assert r.returncode == 0, r.stderr
+    stream.until_state(run, "paused")
+    status = json.loads(daemon.gonio("status", "--json").stdout)
+    assert status["run"]["run"] == run and status["run"]["state"] == "paused"
+    assert status["run"]["emission"] is False
+    assert "paused" in daemon.gonio("status").stdout
+    assert daemon.gonio("pause").returncode == 4
+    r = daemon.gonio("resume", "--detach")
+    assert r.returncode == 0, r.stderr
+    stream.until_state(run, "running")
+    assert daemon.gonio("watch").returncode == 0  # to the end
+    stream.until_state(run, "done")
+    stream.close()
+
+
+def test_a_second_campaign_waits_and_a_stop_puts_it_back(daemon):
+    first, second = daemon.submit(LONG, "long.cfg"), daemon.submit()
+    assert daemon.status()["queued"] == [second["run"]]
+    stream = daemon.follow(first["event_id"])
+    stream.until_state(first["run"], "running")
+    assert daemon.request("POST", "/api/v1/stop")[0] == 200
+    stream.until_state(first["run"], "stopped")
+    stream.close()
+    runs = {r["run"]: r["state"] for r in daemon.request("GET", "/api/v1/runs")[1]["runs"]}
+    assert runs[first["run"]] == "stopped" and runs[second["run"]] == "stopped"
+    assert daemon.status()["run"] is None
+
+
+def test_ctrl_c_ends_the_following_and_not_the_run(daemon, tmp_path):
+    config = tmp_path / "long.cfg"
+    config.write_text(LONG)
+    p = Program([BUILD / "gonio", "run", config, "--json"], tmp_path / "err", daemon.env)
+    p.wait_line('{"event":"reading"')
+    assert p.end(signal.SIGINT) == 130
+    assert "gonio stop" in p.errors()
+    assert daemon.status()["run"]["state"] in ("preparing", "running")
+    assert daemon.gonio("stop").returncode == 0
+    r = daemon.gonio("run", config, "--detach", "--json")
+    assert r.returncode == 0 and json.loads(r.stdout)["state"] in ("queued", "preparing", "running")
+    assert daemon.gonio("stop").returncode == 0
+
+
+# --- the daemon's own beginning and end ---------------------------------------------------------------
+
+def test_sigterm_in_a_run_ends_within_5_s_and_the_run_goes_on_later(start_daemon):
+    d = start_daemon("--sim", "--fast")
+    reply = d.submit(LONG, "long.cfg")
+    d.follow(reply["event_id"]).until(lambda e: e["event"] == "reading" and e["done"] >= 10)
+    sim_pid = int((d.sim_folder() / "goniosim.pid").read_text())
+    began = time.monotonic()
+    assert d.end(signal.SIGTERM) == 0, d.errors()
+    assert time.monotonic() - began < 5.0
+    assert not d.socket.exists() and not list(d.folder.glob("runtime/*"))
+    with pytest.raises(ProcessLookupError):
+        os.kill(sim_pid, 0)
+    (entry,) = json.loads(d.gonio("list", "--json").stdout)
+    assert entry["state"] == "stopped" and entry["done"] >= 10
+
+    again = start_daemon("--sim", "--fast")
+    r = again.gonio("resume", reply["run"], "--detach")
+    assert r.returncode == 0, r.stderr
+    again.follow(0).until(lambda e: e["event"] == "reading" and e["done"] > entry["done"])
+
+
+def test_the_simulator_dies_with_a_killed_daemon(start_daemon):
+    d = start_daemon("--sim", "--fast")
+    sim_pid = int((d.sim_folder() / "goniosim.pid").read_text())
+    pidfd = os.pidfd_open(sim_pid)
+    d.end(signal.SIGKILL)
+    import select
+    assert select.select([pidfd], [], [], PATIENCE_S)[0], "goniosim outlived its daemon"
+    os.close(pidfd)
+    again = start_daemon("--sim", "--fast")  # the dead daemon's socket is replaced
+    assert again.status()["pid"] == again.pid
+
+
+def test_a_second_daemon_is_refused(daemon):
+    r = subprocess.run([BUILD / "goniod", "--sim"], env={**os.environ, **daemon.env}, capture_output=True, text=True,
+                       timeout=PATIENCE_S, check=False)
+    assert r.returncode == 4 and f"already running, pid {daemon.pid}" in r.stderr
+
+
+def test_the_daemon_over_tcp_and_a_given_simulator(start_sim, start_daemon):
+    sim = start_sim("--fast")
+    d = start_daemon("--config", sim.folder / "goniod-tcp.cfg")
+    reply = d.submit()
+    d.follow(reply["event_id"]).until_state(reply["run"], "done")
+    assert sim.control(do="state")
+
+
+@pytest.mark.parametrize("args, says", [
+    ([], "goniod --sim"),
+    (["--sim", "--config", "x"], "leave out --config"),
+    (["--fast", "--config", "x"], "add --sim"),
+    (["--config", "/nowhere/x.cfg"], "/nowhere/x.cfg"),
+    (["--sim", "--sped", "1"], "did you mean '--seed'?"),
+    (["--sim", "--log", "debgu"], "did you mean 'debug'?"),
+    (["--sim", "--socket", "/" + "x" * 200], "107"),
+    (["--sim", "extra"], "too many"),
+])
+def test_wrong_options_are_status_2(tmp_path, args, says):
+    env = {**os.environ, "GONIO_SOCKET": str(tmp_path / "s"), "GONIO_DIR": str(tmp_path)}
+    r = subprocess.run([BUILD / "goniod", *args], capture_output=True, text=True, timeout=PATIENCE_S, env=env, check=False)
+    assert r.returncode == 2 and says in r.stderr, r
