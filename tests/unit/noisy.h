@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// A bad cable between a driver and a simulated port: answers get lost, late, doubled, cut, split, wrapped
+// in garbage or changed, at random and repeatably. Replies of one frame stay whole in the port behind it.
+#pragma once
+#include "sim/port.h"
+
+#include <string.h>
+
+enum noisy_fault {
+    NOISY_LOST, NOISY_LATE, NOISY_DOUBLED, NOISY_CUT, NOISY_SPLIT, NOISY_BEFORE, NOISY_AFTER, NOISY_CHANGED,
+    NOISY_FAULTS
+};
+
+struct noisy {
+    struct port port; // first
+    struct port *inner;
+    uint64_t dice;
+    unsigned one_in;       // answers per fault; 0: none
+    int64_t late_most_ns;  // of a late answer, from when it was due
+    int64_t double_most_ns;
+    uint64_t faults;
+};
+
+static inline unsigned noisy_roll(struct noisy *n, unsigned sides)
+{
+    n->dice ^= n->dice << 13;
+    n->dice ^= n->dice >> 7;
+    n->dice ^= n->dice << 17;
+    return (unsigned)(n->dice >> 33) % sides;
+}
+
+static inline void noisy_garbage(struct noisy *n, int64_t due_ns)
+{
+    uint8_t bytes[7];
+    size_t size = 1 + noisy_roll(n, sizeof bytes);
+    for (size_t i = 0; i < size; i++)
+        bytes[i] = (uint8_t)noisy_roll(n, 256);
+    port_send(&n->port, bytes, size, due_ns);
+}
+
+static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int64_t due_ns)
+{
+    const unsigned fault = n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
+    n->faults += fault < NOISY_FAULTS;
+    switch (fault) {
+    case NOISY_LOST: return;
+    case NOISY_LATE: due_ns += (int64_t)noisy_roll(n, 1000) * (n->late_most_ns / 1000); break;
+    case NOISY_DOUBLED:
+        port_send(&n->port, bytes, size, due_ns);
+        due_ns += (int64_t)noisy_roll(n, 1000) * (n->double_most_ns / 1000);
+        break;
+    case NOISY_CUT: size = noisy_roll(n, (unsigned)size); break;
+    case NOISY_SPLIT:
+        for (size_t i = 0; i + 1 < size; i++)
+            port_send(&n->port, bytes + i, 1, due_ns + (int64_t)i * 500000);
+        bytes += size - 1;
+        due_ns += (int64_t)size * 500000;
+        size = 1;
+        break;
+    case NOISY_BEFORE: noisy_garbage(n, due_ns); break;
+    case NOISY_AFTER:
+        port_send(&n->port, bytes, size, due_ns);
+        noisy_garbage(n, due_ns);
+        return;
+    case NOISY_CHANGED: bytes[noisy_roll(n, (unsigned)size)] ^= (uint8_t)(1 + noisy_roll(n, 255)); break;
+    default: break;
+    }
+    if (size > 0)
+        port_send(&n->port, bytes, size, due_ns);
+}
+
+static inline void noisy_feed(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
+{
+    struct noisy *n = (struct noisy *)p;
+    uint8_t reply[PORT_REPLY_MOST];
+    int64_t due_ns = t_ns;
+    port_feed(n->inner, bytes, size, t_ns);
+    for (size_t got; port_next_ns(n->inner) < PORT_NEVER && n->inner->count > 0 &&
+                     (got = port_take(n->inner, port_next_ns(n->inner), reply, &due_ns)) > 0;)
+        noisy_pass(n, reply, got, due_ns > t_ns ? due_ns : t_ns);
+}
+
+static inline void noisy_tick(struct port *p, int64_t t_ns)
+{
+    (void)p;
+    (void)t_ns;
+}
+
+static inline void noisy_hangup(struct port *p)
+{
+    port_hangup(((struct noisy *)p)->inner);
+}
+
+static inline void noisy_init(struct noisy *n, struct port *inner, uint64_t seed, unsigned one_in)
+{
+    static const struct port_ops ops = {noisy_feed, noisy_tick, noisy_hangup};
+    memset(n, 0, sizeof *n);
+    port_init(&n->port, &ops);
+    n->inner = inner;
+    n->dice = seed;
+    n->one_in = one_in;
+}

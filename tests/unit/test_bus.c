@@ -1,0 +1,453 @@
+// SPDX-License-Identifier: MIT
+// uses: drivers sim model base
+// The bus in virtual time: the unmodified libmodbus on a line that a simulated slave serves.
+#include "drivers/bus.h"
+
+#include "drivers/transport.h"
+#include "sim/modbus.h"
+#include "tests/unit/noisy.h"
+#include "tests/unit/vline.h"
+
+#include <modbus/modbus.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+#include <sys/resource.h>
+
+#define MS(ms) CLK_MS(ms)
+enum { REGISTERS = 64 };
+
+// Two units whose registers hold their own name: unit * 1000 + address. Writes are counted.
+struct slave {
+    struct sim_modbus m; // first: also a port
+    uint16_t registers[2][REGISTERS];
+    int exception, exceptions_left; // answered to that many requests
+    int requests, writes;
+};
+
+static struct slave slave;
+
+static int take_exception(void)
+{
+    slave.requests++;
+    if (slave.exceptions_left <= 0)
+        return 0;
+    slave.exceptions_left--;
+    return slave.exception;
+}
+
+static int read_named(void *ctx, int address, int count, uint16_t *ret, int64_t t_ns)
+{
+    (void)t_ns;
+    int exception = take_exception();
+    if (exception == 0 && address + count > REGISTERS)
+        exception = 2;
+    if (exception == 0)
+        memcpy(ret, (uint16_t *)ctx + address, (size_t)count * 2);
+    return exception;
+}
+
+static int write_named(void *ctx, int address, int count, const uint16_t *values, int64_t t_ns)
+{
+    (void)t_ns;
+    int exception = take_exception();
+    if (exception)
+        return exception;
+    slave.writes++;
+    memcpy((uint16_t *)ctx + address, values, (size_t)count * 2);
+    return 0;
+}
+
+static void slave_init(bool tcp)
+{
+    memset(&slave, 0, sizeof slave);
+    sim_modbus_init(&slave.m, tcp, 0, MS(2));
+    for (int u = 0; u < 2; u++) {
+        sim_modbus_add(&slave.m, (struct sim_modbus_unit){u + 1, read_named, write_named, slave.registers[u]});
+        for (int i = 0; i < REGISTERS; i++)
+            slave.registers[u][i] = (uint16_t)((u + 1) * 1000 + i);
+    }
+}
+
+static struct bus *begin(struct port *port, const struct cancel *cancel)
+{
+    struct bus *b;
+    struct gon_error err;
+    slave_init(false);
+    struct clk *clk = vline_begin(port);
+    if (bus_open(vline.bus, 100, 350, clk, cancel, &b, &err) < 0)
+        fail_msg("%s", err.text);
+    return b;
+}
+
+static void registers_are_read_and_written(void **state)
+{
+    uint16_t r[8];
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    assert_int_equal(bus_read(b, 2, 10, 3, r, NULL), 0);
+    assert_int_equal(r[0], 2010);
+    assert_int_equal(r[2], 2012);
+    assert_int_equal(bus_write(b, 1, 5, 2, (const uint16_t[]){7, 8}, NULL), 0);
+    assert_int_equal(slave.registers[0][6], 8);
+    assert_int_equal(bus_stats(b)->requests, 2);
+    assert_int_equal(bus_stats(b)->last_latency_ns, MS(2));
+    bus_close(b);
+}
+
+static void the_line_is_silent_between_frames(void **state)
+{
+    uint16_t r[8];
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    const int64_t start_ns = vline.clk.t_ns;
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(bus_read(b, 1, 0, 4, r, NULL), 0);
+    assert_int_equal(vline.clk.t_ns - start_ns, 3 * MS(2) + 2 * MS(1.75));
+    bus_close(b);
+}
+
+static void a_slow_line_has_longer_gaps(void **state)
+{
+    struct bus *b;
+    struct gon_error err;
+    char link[128];
+    uint16_t r[8];
+    (void)state;
+    slave_init(false);
+    struct clk *clk = vline_begin(&slave.m.port);
+    snprintf(link, sizeof link, "%s?baud=9600&parity=E&stop=1", vline.bus);
+    assert_int_equal(bus_open(link, 100, 350, clk, NULL, &b, &err), 0);
+    const int64_t start_ns = vline.clk.t_ns;
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(bus_read(b, 1, 0, 4, r, NULL), 0);
+    assert_int_equal(vline.clk.t_ns - start_ns, 2 * MS(2) + (int64_t)(3.5 * 11e9 / 9600));
+    bus_close(b);
+}
+
+static void wrong_settings_are_refused(void **state)
+{
+    struct bus *b = NULL;
+    struct gon_error err;
+    (void)state;
+    struct clk *clk = vline_begin(&slave.m.port);
+    assert_int_equal(bus_open(vline.bus, 9, 350, clk, NULL, &b, &err), GON_E_INPUT);
+    assert_int_equal(bus_open(vline.bus, 201, 350, clk, NULL, &b, &err), GON_E_INPUT);
+    assert_int_equal(bus_open(vline.bus, 100, 1001, clk, NULL, &b, &err), GON_E_INPUT);
+    assert_int_equal(bus_open(vline.link, 100, 350, clk, NULL, &b, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "modbus-rtu:"));
+    assert_null(b);
+}
+
+static void exceptions_name_function_address_and_count(void **state)
+{
+    uint16_t r[8] = {42};
+    struct gon_error err;
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    assert_int_equal(bus_read(b, 1, 62, 4, r, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "unit 1 has no such register"));
+    assert_non_null(strstr(err.text, "exception 2; function 3, 4 registers at 003Eh"));
+    assert_int_equal(r[0], 42);
+    assert_int_equal(slave.requests, 1); // not repeated
+    slave.exception = 4;
+    slave.exceptions_left = 1;
+    assert_int_equal(bus_write(b, 2, 0, 1, r, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "exception 4; function 16"));
+    assert_int_equal(bus_stats(b)->exceptions, 2);
+    bus_close(b);
+}
+
+static void a_busy_unit_is_waited_for(void **state)
+{
+    uint16_t r[8];
+    struct gon_error err;
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    slave.exception = 6;
+    slave.exceptions_left = 4;
+    assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
+    slave.exceptions_left = 4;
+    assert_int_equal(bus_write(b, 1, 0, 2, r, NULL), 0);
+    assert_int_equal(slave.writes, 1);
+
+    slave.exceptions_left = 1000;
+    const int64_t start_ns = vline.clk.t_ns;
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "stays busy"));
+    assert_true(vline.clk.t_ns - start_ns <= MS(1010));
+    assert_true(slave.requests < 30);
+    bus_close(b);
+}
+
+// "Accepted, still at work" must not make a write happen twice.
+static void an_acknowledged_write_is_not_repeated(void **state)
+{
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    slave.exception = 5;
+    slave.exceptions_left = 1;
+    assert_int_equal(bus_write(b, 1, 0, 1, (const uint16_t[]){1}, NULL), 0);
+    assert_int_equal(slave.requests, 1);
+    bus_close(b);
+}
+
+static void a_lost_answer_repeats_reads_but_never_writes(void **state)
+{
+    uint16_t r[8];
+    struct gon_error err;
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    slave.m.port.drop = 2;
+    assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
+    assert_int_equal(bus_stats(b)->retries, 2);
+    assert_int_equal(bus_stats(b)->timeouts, 2);
+
+    slave.m.port.drop = 1;
+    assert_int_equal(bus_write(b, 1, 0, 1, (const uint16_t[]){77}, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "it may have been carried out"));
+    assert_int_equal(slave.writes, 1);
+    assert_int_equal(slave.registers[0][0], 77);
+
+    slave.m.port.drop = 3;
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "unit 1 does not answer"));
+    bus_close(b);
+}
+
+static void a_unit_that_is_not_there_does_not_answer(void **state)
+{
+    uint16_t r[2];
+    struct gon_error err;
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    assert_int_equal(bus_read(b, 9, 0, 2, r, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "unit 9 does not answer"));
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), 0);
+    bus_close(b);
+}
+
+// Answers written byte by byte: who it is from, what is in it, what its checksum is.
+static uint8_t forged[16];
+static size_t forged_size;
+
+static void feed_forged(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
+{
+    if (slave.requests++ == 0)
+        port_send(p, forged, forged_size, t_ns + MS(1));
+    else {
+        port_feed(&slave.m.port, bytes, size, t_ns);
+        uint8_t reply[PORT_REPLY_MOST];
+        size_t n = port_take(&slave.m.port, t_ns + MS(5), reply, NULL);
+        port_send(p, reply, n, t_ns + MS(2));
+    }
+}
+
+static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error)
+{
+    static const struct port_ops ops = {feed_forged, scripted_nothing, scripted_hangup};
+    struct port p;
+    uint16_t r[2];
+    port_init(&p, &ops);
+    struct bus *b = begin(&p, NULL);
+    memcpy(forged, pdu, size);
+    const uint16_t crc = sim_modbus_crc(pdu, size) ^ crc_error;
+    forged[size] = (uint8_t)crc;
+    forged[size + 1] = (uint8_t)(crc >> 8);
+    forged_size = size + 2;
+    assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
+    assert_int_equal(r[0], 1000);
+    assert_int_equal(r[1], 1001);
+    assert_int_equal(bus_stats(b)->retries, 1);
+    bus_close(b);
+}
+
+static void wrong_unit_function_length_or_checksum_is_no_answer(void **state)
+{
+    (void)state;
+    check_forged((const uint8_t[]){2, 3, 4, 0, 9, 0, 9}, 7, 0);
+    check_forged((const uint8_t[]){1, 4, 4, 0, 9, 0, 9}, 7, 0);
+    check_forged((const uint8_t[]){1, 3, 2, 0, 9}, 5, 0);
+    check_forged((const uint8_t[]){1, 3, 6, 0, 9, 0, 9, 0, 9}, 9, 0);
+    check_forged((const uint8_t[]){1, 3, 4, 0, 9, 0, 9}, 7, 0x0100);
+}
+
+static void a_hang_up_is_gone_and_a_new_plug_works(void **state)
+{
+    uint16_t r[2];
+    struct gon_error err;
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    slave.m.port.mute = true;
+    vline.hangup_ns = vline.clk.t_ns + MS(30);
+    const int64_t start_ns = vline.clk.t_ns;
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), GON_E_GONE);
+    assert_true(vline.clk.t_ns - start_ns <= MS(31));
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), GON_E_GONE);
+    assert_int_equal(bus_write(b, 1, 0, 2, r, &err), GON_E_GONE);
+    assert_true(vline.waits < 20);
+
+    vline.hangup_ns = PORT_NEVER;
+    slave.m.port.mute = false;
+    assert_int_equal(bus_reopen(b, &err), 0);
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), 0);
+    assert_int_equal(bus_stats(b)->reopened, 1);
+    bus_close(b);
+}
+
+static void reads_can_be_cancelled_and_writes_go_out_anyway(void **state)
+{
+    uint16_t r[2];
+    struct gon_error err;
+    struct cancel *cancel = cancel_new();
+    (void)state;
+    struct bus *b = begin(&slave.m.port, cancel);
+    slave.m.port.mute = true;
+    cancel_request(cancel);
+    assert_int_equal(bus_read(b, 1, 0, 2, r, &err), GON_E_CANCELED);
+    slave.m.port.mute = false;
+    slave.m.port.drop = 1;
+    assert_int_equal(bus_write(b, 1, 0, 1, r, &err), GON_E_LINK); // now it is out of step
+    assert_int_equal(bus_write(b, 1, 0, 1, r, &err), 0);
+    bus_close(b);
+    cancel_free(cancel);
+}
+
+static void nothing_waits_longer_than_one_answer(void **state)
+{
+    uint16_t r[2];
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    slave.m.port.mute = true;
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), GON_E_LINK);
+    vline_turn();
+    assert_true(vline.longest_ns <= MS(152)); // an answer of 100 ms, and a slice of draining
+    bus_close(b);
+}
+
+static void a_descriptor_too_large_for_select_is_refused(void **state)
+{
+    struct bus *b = NULL;
+    struct gon_error err;
+    struct rlimit limit, before;
+    (void)state;
+    getrlimit(RLIMIT_NOFILE, &before);
+    limit = before;
+    if (limit.rlim_cur < 1100)
+        limit.rlim_cur = limit.rlim_max < 1100 ? limit.rlim_max : 1100;
+    if (limit.rlim_cur < 1100 || setrlimit(RLIMIT_NOFILE, &limit))
+        skip();
+    struct clk *clk = vline_begin(&slave.m.port);
+    int spare = dup(0), top = spare;
+    while (top < 1024)
+        top = dup(0);
+    assert_int_equal(bus_open(vline.bus, 100, 350, clk, NULL, &b, &err), GON_E_SYSTEM);
+    assert_non_null(strstr(err.text, "too large for libmodbus"));
+    for (; top >= spare; top--)
+        close(top);
+    setrlimit(RLIMIT_NOFILE, &before);
+}
+
+// --- many readings under faults ------------------------------------------------------------------------
+
+enum { READINGS = 10000, SEED = 20240917 };
+
+// Neighbouring reads differ in length, as the drivers' do; late answers come within quiet_ms.
+static int address_of(int i)
+{
+    return i * 7 % 40;
+}
+
+static int count_of(int i)
+{
+    return i % 2 ? 8 : 4;
+}
+
+static bool is_right(int i, const uint16_t *r)
+{
+    bool right = true;
+    for (int k = 0; k < count_of(i); k++)
+        right &= r[k] == (1 + i / 2 % 2) * 1000 + address_of(i) + k;
+    return right;
+}
+
+static struct noisy noisy;
+
+static void begin_noisy(void)
+{
+    noisy_init(&noisy, &slave.m.port, SEED, 10);
+    noisy.late_most_ns = MS(340);
+    noisy.double_most_ns = MS(340);
+}
+
+static void no_wrong_value_under_faults(void **state)
+{
+    int good = 0, wrong = 0;
+    uint16_t r[8];
+    (void)state;
+    begin_noisy();
+    struct bus *b = begin(&noisy.port, NULL);
+    for (int i = 0; i < READINGS; i++)
+        if (bus_read(b, 1 + i / 2 % 2, address_of(i), count_of(i), r, NULL) == 0) {
+            good++;
+            wrong += !is_right(i, r);
+        }
+    print_message("seed %d: %d readings, %llu faults, %d answered, %d wrong, %.0f s of bus time\n", SEED,
+                  READINGS, (unsigned long long)noisy.faults, good, wrong, (double)vline.clk.t_ns * 1e-9);
+    assert_true(noisy.faults > READINGS / 20);
+    assert_true(good >= READINGS - READINGS / 100);
+    assert_int_equal(wrong, 0);
+    bus_close(b);
+}
+
+// The same faults on libmodbus alone, all reads of one length: what the protections are for.
+static void the_bare_library_gives_wrong_values(void **state)
+{
+    int good = 0, wrong = 0;
+    uint16_t r[8];
+    struct transport *t;
+    (void)state;
+    begin_noisy();
+    slave_init(false);
+    struct clk *clk = vline_begin(&noisy.port);
+    assert_int_equal(transport_open(vline.link, clk, NULL, &t, NULL), 0);
+    modbus_t *m = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
+    modbus_set_socket(m, transport_fd(t));
+    modbus_set_response_timeout(m, 0, 100000);
+    modbus_set_slave(m, 1);
+    for (int i = 0; i < READINGS; i++)
+        if (modbus_read_registers(m, address_of(i), 4, r) == 4) {
+            good++;
+            wrong += r[0] != 1000 + address_of(i);
+        }
+    print_message("bare: %d answered, %d wrong\n", good, wrong);
+    assert_true(wrong > 100);
+    modbus_set_socket(m, -1);
+    modbus_free(m);
+    transport_close(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(registers_are_read_and_written),
+        cmocka_unit_test(the_line_is_silent_between_frames),
+        cmocka_unit_test(a_slow_line_has_longer_gaps),
+        cmocka_unit_test(wrong_settings_are_refused),
+        cmocka_unit_test(exceptions_name_function_address_and_count),
+        cmocka_unit_test(a_busy_unit_is_waited_for),
+        cmocka_unit_test(an_acknowledged_write_is_not_repeated),
+        cmocka_unit_test(a_lost_answer_repeats_reads_but_never_writes),
+        cmocka_unit_test(a_unit_that_is_not_there_does_not_answer),
+        cmocka_unit_test(wrong_unit_function_length_or_checksum_is_no_answer),
+        cmocka_unit_test(a_hang_up_is_gone_and_a_new_plug_works),
+        cmocka_unit_test(reads_can_be_cancelled_and_writes_go_out_anyway),
+        cmocka_unit_test(nothing_waits_longer_than_one_answer),
+        cmocka_unit_test(a_descriptor_too_large_for_select_is_refused),
+        cmocka_unit_test(no_wrong_value_under_faults),
+        cmocka_unit_test(the_bare_library_gives_wrong_values),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
