@@ -47,12 +47,21 @@ static const struct verb *find(const char *name)
     return NULL;
 }
 
+// scdoc takes a star for the beginning of bold.
+static void print_escaped(const char *text, FILE *out)
+{
+    for (; *text; text++)
+        fprintf(out, "%s%c", *text == '*' ? "\\" : "", *text);
+}
+
 // The list of verbs with their options as scdoc text.
 static void print_manual(FILE *out)
 {
     for (int i = 0; i < VERBS; i++) {
         const struct verb *v = verbs[i];
-        fprintf(out, "## %s %s\n\n%s\n", v->name, v->operands, v->about);
+        fprintf(out, "## %s %s\n\n", v->name, v->operands);
+        print_escaped(v->about, out);
+        fputc('\n', out);
         options_manual(out, v->options);
     }
 }
