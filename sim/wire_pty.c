@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // A serial line as a pty. While no client has the slave open the master reports POLLHUP without end, so
 // that it is not polled then; inotify on the slave says when somebody opens it. After the last close
-// the line settings go back to what they were: the C library reports EINVAL for a tcsetattr that asks
-// for parity (which ptys cannot have) and changes no input, output or local flag. So these settings are
-// raw but for two flags that do nothing here and that every serial client clears.
+// the line goes back to a baud nobody asks for: the C library reports EINVAL for a tcsetattr that asks for
+// parity, which ptys cannot have, and changes nothing else. (A client that sets the same twice still
+// gets it; pymodbus does so when strict.)
 #include "sim/wire.h"
 
 #include <errno.h>
@@ -24,8 +24,6 @@ static void pristine(int master)
     if (tcgetattr(master, &t))
         return;
     cfmakeraw(&t);
-    t.c_oflag |= OPOST;
-    t.c_lflag |= IEXTEN;
     cfsetspeed(&t, B134);
     tcsetattr(master, TCSANOW, &t);
 }
