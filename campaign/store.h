@@ -3,7 +3,7 @@
 // attempt, reductions, fits, events. Readings are added, never changed. Acknowledged means committed.
 //
 // While it is written: WAL, synchronous=FULL, a commit a call. Closed: a single file. One writer at a time,
-// held by flock on "FILE-lock" beside it, which names its process; readers never wait for it. A struct
+// held by a lock on "FILE-lock" beside it, which names its process; readers never wait for it. A struct
 // store belongs to one thread; several may be open on one file.
 //
 // Errors: GON_E_STORE, the file or its disk (full, I/O, busy, moved, damaged: the text says which and what
@@ -88,6 +88,9 @@ int store_open(const char *path, enum store_mode mode, struct store **ret_store,
 // Makes it a single file. The store is gone in any case; GON_E_STORE when the last checkpoint failed, which
 // loses nothing. NULL is fine.
 int store_close(struct store *s, struct gon_error *err);
+
+// How long somebody else's write lock on the file is waited for: 8000 ms unless said otherwise here.
+void store_set_patience(struct store *s, int patience_ms);
 
 // The process that has the file open for writing, 0: none.
 int store_writer(const char *path);

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Private to campaign/store*.c: the open file, and SQLite with our errors.
+#pragma once
+#include "campaign/store.h"
+#include "campaign/store_lock.h"
+
+#include <sqlite3.h>
+#include <sys/types.h>
+
+enum {
+    STORE_APPLICATION = 0x676f6e69, // "goni"
+    STORE_VERSION = 1,
+    STORE_PATIENCE_MS = 8000
+};
+
+struct store {
+    sqlite3 *db;
+    enum store_mode mode;
+    struct store_lock lock;
+    char path[512];
+    dev_t device; // of the file as it was opened
+    ino_t inode;
+    bool broken; // after an I/O error nothing that SQLite remembers can be trusted: reopen first
+    int patience_ms;
+};
+
+// The error for SQLite's last complaint, with the file and what to do.
+int store_db_fail(struct store *s, struct gon_error *err);
+int store_db_run(struct store *s, const char *sql, struct gon_error *err);
+// A statement; finalize it. GON_E_STORE.
+int store_db_prepare(struct store *s, const char *sql, sqlite3_stmt **ret_statement,
+                     struct gon_error *err);
+// Steps a statement that returns no row and finalizes it.
+int store_db_finish(struct store *s, sqlite3_stmt *statement, struct gon_error *err);
+// Ready to write: open for writing, still at its path, mended after an error.
+int store_db_ready(struct store *s, struct gon_error *err);
+// Several statements as one commit: begin, then end with their result.
+int store_db_begin(struct store *s, struct gon_error *err);
+int store_db_end(struct store *s, int rc, struct gon_error *err);
+
+void store_db_bind_text(sqlite3_stmt *statement, int index,
+                        const char *text); // NULL: NULL; must outlive it
+
+// campaign/store_schema.c
+extern const char store_schema_sql[];
+int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err);

@@ -1,0 +1,642 @@
+// SPDX-License-Identifier: MIT
+// uses: campaign fit model base
+#include "campaign_fixture.h"
+
+#include "campaign/store_lock.h"
+#include "campaign/store_row.h"
+
+#include <fcntl.h>
+#include <limits.h>
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+#include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+
+#define CONFIG                                                                                     \
+    "campaign: { name = \"Test paint\"; sample = \"panel 3\"; theta_i_deg = (10, 20, 30);"         \
+    " theta_r: { from_deg = -20; to_deg = 40; step_deg = 10; }; dense: { half_width_deg = 1; }; "  \
+    "};"
+
+static struct fixture_folder folder;
+static char path[128];
+
+static int begin(void **state)
+{
+    (void)state;
+    folder = fixture_folder();
+    fixture_path(&folder, "0001-test.gonio", path, sizeof path);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    fixture_remove(&folder);
+    return 0;
+}
+
+static struct store *created_from(const char *config_text)
+{
+    const struct campaign_config config = fixture_campaign(config_text);
+    const struct bench_config bench = fixture_bench();
+    struct plan plan;
+    struct store *s = NULL;
+    struct gon_error err = {0};
+    assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
+    const struct store_new what = {&config,       config_text, "test.cfg",   &bench,
+                                   FIXTURE_BENCH, &plan,       1700000000123};
+    assert_int_equal(store_create(path, &what, &s, &err), 0);
+    plan_clear(&plan);
+    return s;
+}
+
+static struct store *created(void)
+{
+    return created_from(CONFIG);
+}
+
+static struct store_reading reading(int sweep, int point, int attempt)
+{
+    return (struct store_reading){.sweep = sweep,
+                                  .point = point,
+                                  .attempt = attempt,
+                                  .t_utc_ms = 1700000001000 + point,
+                                  .theta_i_udeg = 10000300,
+                                  .theta_r_udeg = -20000100,
+                                  .signal_v = 1.23456789e-3,
+                                  .signal_sd_v = 1.5e-6,
+                                  .monitor_v = 1.001,
+                                  .monitor_sd_v = 2e-4,
+                                  .count = 4,
+                                  .range = 7};
+}
+
+static void append(struct store *s, const struct store_reading *r)
+{
+    struct gon_error err = {0};
+    int rc = store_append_reading(s, r, &err);
+    if (rc < 0)
+        print_error("%s\n", err.text);
+    assert_int_equal(rc, 0);
+}
+
+static struct store *opened(enum store_mode mode)
+{
+    struct store *s = NULL;
+    struct gon_error err = {0};
+    int rc = store_open(path, mode, &s, &err);
+    if (rc < 0)
+        print_error("%s\n", err.text);
+    assert_int_equal(rc, 0);
+    return s;
+}
+
+// Somebody else at the file, past our code.
+static void tamper(const char *sql)
+{
+    sqlite3 *db;
+    char *why = NULL;
+    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+    if (sqlite3_exec(db, sql, NULL, NULL, &why) != SQLITE_OK)
+        print_error("%s\n", why);
+    assert_null(why);
+    sqlite3_close(db);
+}
+
+static void what_goes_in_comes_out(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    const struct store_reading a = reading(1, 0, 1);
+    struct store_reading b = reading(1, 0, 2), *rows;
+    b.monitor_v = b.monitor_sd_v = (double)NAN;
+    b.signal_v = -0.0;
+    b.theta_r_udeg = INT_MIN;
+    b.flags = STORE_SATURATED | STORE_MOVED;
+    append(s, &b);
+    append(s, &a);
+    assert_int_equal(store_close(s, NULL), 0);
+    s = opened(STORE_READ);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 2);
+    unsigned char in[STORE_ROW_BYTES], out[STORE_ROW_BYTES];
+    store_row_bytes(&a, in);
+    store_row_bytes(&rows[0], out);
+    assert_memory_equal(in, out, sizeof in);
+    assert_true(rows[0].signal_v == a.signal_v && rows[0].theta_r_udeg == a.theta_r_udeg);
+    assert_true(isnan(rows[1].monitor_v) && isnan(rows[1].monitor_sd_v) && rows[1].signal_v == 0);
+    assert_true(rows[1].theta_r_udeg == INT_MIN && rows[1].flags == b.flags &&
+                rows[1].attempt == 2);
+    free(rows);
+    assert_int_equal(store_read_readings(s, 2, &rows, NULL), 0);
+    free(rows);
+    assert_int_equal(store_append_reading(s, &a, NULL), GON_E_REFUSED);
+    store_close(s, NULL);
+}
+
+// The canonical bytes, by an independent packing (Python's struct '<iiiqiiddddiiI' and a bitwise
+// CRC).
+static void check_values_are_as_documented(void **state)
+{
+    (void)state;
+    struct store_reading r = reading(3, 17, 2);
+    r.flags = 5;
+    assert_int_equal(store_row_crc(&r), 0x159a72a4);
+    r.monitor_v = r.monitor_sd_v = (double)NAN;
+    assert_int_equal(store_row_crc(&r), 0xde9242c6);
+}
+
+static void the_campaign_is_kept_as_it_was(void **state)
+{
+    (void)state;
+    struct campaign_config c, original = fixture_campaign(CONFIG);
+    struct bench_config b;
+    const struct bench_config bench = fixture_bench();
+    struct plan made, kept;
+    store_close(created(), NULL);
+    struct store *s = opened(STORE_READ);
+    assert_int_equal(store_read_config(s, &c, NULL), 0);
+    assert_memory_equal(&c, &original, sizeof c);
+    assert_int_equal(store_read_bench(s, &b, NULL), 0);
+    assert_memory_equal(&b, &bench, sizeof b);
+    assert_int_equal(plan_make(&c, &b, &made, NULL), 0);
+    assert_int_equal(store_read_plan(s, &kept, NULL), 0);
+    assert_true(kept.count == made.count && kept.samples == made.samples &&
+                kept.sweeps == made.sweeps);
+    for (int i = 0; i < made.count; i++)
+        assert_memory_equal(&kept.points[i], &made.points[i], sizeof made.points[i]);
+    const char *const meta[][2] = {
+        {"name", "Test paint"}, {"sample", "panel 3"},     {"created_utc_ms", "1700000000123"},
+        {"pol_in", "u"},        {"regime", "underfilled"}, {"config", CONFIG}};
+    for (size_t i = 0; i < sizeof meta / sizeof *meta; i++) {
+        char *text = store_read_meta(s, meta[i][0]);
+        assert_string_equal(text, meta[i][1]);
+        free(text);
+    }
+    assert_null(store_read_meta(s, "colour"));
+    plan_clear(&made);
+    plan_clear(&kept);
+    store_close(s, NULL);
+}
+
+static void the_same_row_again_is_accepted_another_is_not(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    struct store_reading r = reading(1, 2, 1), *rows;
+    struct gon_error err;
+    append(s, &r);
+    append(s, &r);
+    r.signal_v *= 1.0000001;
+    assert_int_equal(store_append_reading(s, &r, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "sweep 1, point 2, attempt 1 is there already"));
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 1);
+    free(rows);
+    store_close(s, NULL);
+}
+
+static void what_is_not_a_reading_is_refused(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    struct store_reading bad[8], *rows;
+    for (int i = 0; i < 8; i++)
+        bad[i] = reading(1, 1, 1);
+    bad[0].signal_v = (double)NAN;
+    bad[1].signal_sd_v = (double)INFINITY;
+    bad[2].monitor_v = (double)INFINITY;
+    bad[3].monitor_sd_v = (double)NAN; // with a monitor
+    bad[4].attempt = 0;
+    bad[5].count = 0;
+    bad[6].signal_sd_v = -1;
+    bad[7].point = 99; // not in the plan
+    for (int i = 0; i < 8; i++)
+        assert_int_equal(store_append_reading(s, &bad[i], NULL), GON_E_INPUT);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 0);
+    free(rows);
+    store_close(s, NULL);
+}
+
+static void progress_counts_accepted_readings_only(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    struct store_progress p;
+    struct plan plan;
+    assert_int_equal(store_read_progress(s, &p, NULL), 0);
+    const int total = p.total;
+    assert_true(p.done == 0 && p.sweep == 0 && p.point == 0 && p.sweeps == 3 && p.readings == 0);
+    for (unsigned bit = 0; bit < 8; bit++) { // every flag rejects
+        struct store_reading r = reading(0, 0, (int)bit + 1);
+        r.flags = 1u << bit;
+        append(s, &r);
+    }
+    assert_int_equal(store_read_progress(s, &p, NULL), 0);
+    assert_true(p.done == 0 && p.sweep == 0 && p.point == 0 && p.readings == 8);
+    append(s, &(struct store_reading){.sweep = 0, .point = 0, .attempt = 9, .count = 1});
+    append(s, &(struct store_reading){.sweep = 0, .point = 1, .attempt = 1, .count = 1});
+    assert_int_equal(store_read_plan(s, &plan, NULL), 0);
+    assert_true(plan.points[0].done && plan.points[0].attempts == 9);
+    for (int i = 0; i < plan.count; i++)
+        if (plan.points[i].sweep == 1 && plan.points[i].point != 2)
+            append(s, &(struct store_reading){
+                          .sweep = 1, .point = plan.points[i].point, .attempt = 1, .count = 1});
+    assert_int_equal(store_read_progress(s, &p, NULL), 0);
+    assert_true(p.sweep == 1 && p.point == 2 && p.sweeps_done == 0);
+    append(s, &(struct store_reading){.sweep = 1, .point = 2, .attempt = 1, .count = 1});
+    assert_int_equal(store_read_progress(s, &p, NULL), 0);
+    assert_true(p.sweep == 2 && p.point == 0 && p.sweeps_done == 1);
+    for (int i = 0; i < plan.count; i++)
+        if (plan.points[i].sweep > 1)
+            append(s, &(struct store_reading){.sweep = plan.points[i].sweep,
+                                              .point = plan.points[i].point,
+                                              .attempt = 1,
+                                              .count = 1});
+    assert_int_equal(store_read_progress(s, &p, NULL), 0);
+    assert_true(p.sweep == -1 && p.done == total && p.sweeps_done == 3);
+    plan_clear(&plan);
+    store_close(s, NULL);
+}
+
+static void closed_is_one_file_even_with_a_reader(void **state)
+{
+    (void)state;
+    struct store *s = created(), *reader;
+    const struct store_reading r = reading(1, 1, 1);
+    append(s, &r);
+    assert_true(fixture_files(&folder) > 1); // WAL and lock
+    store_close(s, NULL);
+    assert_int_equal(fixture_files(&folder), 1);
+    s = opened(STORE_WRITE);
+    struct store_reading second = reading(1, 2, 1), *rows;
+    append(s, &second);
+    reader = opened(STORE_READ);
+    assert_int_equal(store_read_readings(reader, -1, &rows, NULL), 2);
+    free(rows);
+    assert_int_equal(store_close(s, NULL), 0);
+    assert_int_equal(store_close(reader, NULL), 0);
+    assert_int_equal(fixture_files(&folder), 1);
+}
+
+static void a_second_writer_is_refused_and_told_who(void **state)
+{
+    (void)state;
+    struct store *s = created(), *other;
+    struct gon_error err;
+    char mine[40];
+    snprintf(mine, sizeof mine, "in use by process %d", (int)getpid());
+    assert_int_equal(store_open(path, STORE_WRITE, &other, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, mine));
+    assert_int_equal(store_writer(path), getpid());
+    store_close(s, NULL);
+    assert_int_equal(store_writer(path), 0);
+    // A lock file left behind by a crash stops nobody.
+    char lock[160];
+    snprintf(lock, sizeof lock, "%s-lock", path);
+    close(open(lock, O_CREAT | O_WRONLY, 0600));
+    assert_int_equal(store_writer(path), 0);
+    s = opened(STORE_WRITE);
+    store_close(s, NULL);
+    assert_int_equal(fixture_files(&folder), 1);
+}
+
+static void a_new_file_never_replaces_one(void **state)
+{
+    (void)state;
+    store_close(created(), NULL);
+    const struct campaign_config config = fixture_campaign(CONFIG);
+    const struct bench_config bench = fixture_bench();
+    struct plan plan;
+    struct store *s;
+    struct gon_error err;
+    assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
+    const struct store_new what = {&config, CONFIG, "test.cfg", &bench, FIXTURE_BENCH, &plan, 1};
+    assert_int_equal(store_create(path, &what, &s, &err), GON_E_REFUSED);
+    assert_int_equal(fixture_files(&folder), 1);
+    plan_clear(&plan);
+}
+
+static void damage_is_named_and_nothing_is_recreated(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    struct gon_error err;
+    for (int point = 0; point < 5; point++) {
+        const struct store_reading r = reading(2, point, 1);
+        append(s, &r);
+    }
+    store_close(s, NULL);
+    tamper("DROP TRIGGER reading_UPDATE; UPDATE reading SET signal_v = signal_v * 1.001 WHERE "
+           "point = 3");
+    struct store_reading *rows;
+    s = opened(STORE_READ);
+    assert_int_equal(store_read_readings(s, -1, &rows, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "sweep 2, point 3, attempt 1 is damaged"));
+    store_close(s, NULL);
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "sweep 2, point 3"));
+    tamper("UPDATE meta SET value = 'campaign: {};' WHERE key = 'config'");
+    struct campaign_config c;
+    s = opened(STORE_READ);
+    assert_int_equal(store_read_config(s, &c, &err), GON_E_STORE);
+    store_close(s, NULL);
+    int fd = open(path, O_WRONLY); // the schema's page
+    assert_int_equal(pwrite(fd, "junkjunkjunkjunk", 16, 100), 16);
+    close(fd);
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "keep the file"));
+}
+
+static void readings_cannot_be_changed_by_accident(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    const struct store_reading r = reading(1, 1, 1);
+    append(s, &r);
+    store_close(s, NULL);
+    sqlite3 *db;
+    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(db, "UPDATE reading SET flags = 1", NULL, NULL, NULL),
+                     SQLITE_CONSTRAINT);
+    assert_int_equal(sqlite3_exec(db, "DELETE FROM reading", NULL, NULL, NULL), SQLITE_CONSTRAINT);
+    sqlite3_close(db);
+}
+
+static void other_files_and_newer_ones_are_refused(void **state)
+{
+    (void)state;
+    struct store *s;
+    struct gon_error err;
+    assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_INPUT); // not there
+    tamper("CREATE TABLE t (x)");
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "not a campaign file"));
+    int fd = open(path, O_WRONLY | O_TRUNC);
+    assert_int_equal(write(fd, "theta_i_deg,theta_r_deg,f_r\n", 28), 28);
+    close(fd);
+    assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_INPUT);
+    assert_int_equal(store_open(folder.path, STORE_READ, &s, &err), GON_E_INPUT);
+    unlink(path);
+    store_close(created(), NULL);
+    tamper("PRAGMA user_version = 2");
+    assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "newer"));
+}
+
+static void a_moved_file_is_noticed_at_the_next_reading(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    struct store_reading a = reading(1, 0, 1), b = reading(1, 1, 1), *rows;
+    struct gon_error err;
+    char away[160];
+    snprintf(away, sizeof away, "%s.away", path);
+    append(s, &a);
+    assert_int_equal(rename(path, away), 0);
+    assert_int_equal(store_append_reading(s, &b, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "moved, removed or replaced"));
+    assert_int_equal(rename(away, path), 0);
+    append(s, &b);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 2);
+    free(rows);
+    store_close(s, NULL);
+}
+
+static void anothers_write_lock_is_waited_for_then_named(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    const struct store_reading r = reading(1, 1, 1);
+    struct gon_error err;
+    sqlite3 *db;
+    store_set_patience(s, 1);
+    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(db, "BEGIN IMMEDIATE", NULL, NULL, NULL), SQLITE_OK);
+    assert_int_equal(store_append_reading(s, &r, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "holds its write lock"));
+    assert_int_equal(store_lock_wal_writer(path), getpid()); // here the other is we
+    sqlite3_exec(db, "ROLLBACK", NULL, NULL, NULL);
+    sqlite3_close(db);
+    append(s, &r);
+    store_close(s, NULL);
+}
+
+// A limit on the file's size stands for a full disk: the write fails at any byte, and the rows
+// before it stay.
+static void a_full_disk_loses_nothing_that_was_acknowledged(void **state)
+{
+    (void)state;
+    struct rlimit before, tight;
+    struct stat st;
+    struct store *s =
+        created_from("campaign: { name = \"a\"; theta_i_deg = (10, 20, 30);"
+                     " theta_r: { step_deg = 0.1; }; dense: { half_width_deg = 0; }; };");
+    struct gon_error err = {0};
+    int acknowledged = 0, refused = 0;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(stat(path, &st), 0);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    tight = before;
+    tight.rlim_cur = (rlim_t)st.st_size + 100000;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
+    for (int sweep = 1; sweep <= 3 && refused < 3; sweep++)
+        for (int point = 0; point < 1700 && refused < 3; point++) {
+            const struct store_reading r = reading(sweep, point, 1);
+            int rc = store_append_reading(s, &r, &err);
+            assert_true(rc == 0 || rc == GON_E_STORE);
+            acknowledged += rc == 0;
+            refused += rc != 0;
+            point -= rc != 0; // the same row again
+        }
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    assert_int_equal(refused, 3);
+    assert_true(acknowledged > 0);
+    struct store_reading *rows, next = reading(1 + acknowledged / 1700, acknowledged % 1700, 1);
+    append(s, &next);
+    assert_int_equal(store_read_readings(s, -1, &rows, &err), acknowledged + 1);
+    free(rows);
+    store_close(s, NULL);
+    s = opened(STORE_WRITE);
+    assert_int_equal(store_read_readings(s, -1, &rows, &err), acknowledged + 1);
+    free(rows);
+    store_close(s, NULL);
+}
+
+static void child_appends(int to_parent, struct store *s)
+{
+    int n = 0;
+    for (int sweep = 1; sweep <= 3; sweep++)
+        for (int point = 0; point < 1700; point++, n++) {
+            const struct store_reading r = reading(sweep, point, 1);
+            if (store_append_reading(s, &r, NULL) < 0 || write(to_parent, &n, sizeof n) != sizeof n)
+                _exit(1);
+        }
+    _exit(0);
+}
+
+// SIGKILL at a random moment: every acknowledged row is there and the file can be written again.
+static void killed_writers_lose_no_acknowledged_row(void **state)
+{
+    (void)state;
+    const char *given = getenv("TEST_SEED");
+    unsigned seed = given ? (unsigned)atoi(given) : (unsigned)time(NULL) ^ (unsigned)getpid();
+    print_message("seed %u (TEST_SEED)\n", seed);
+    for (int round = 0; round < 5; round++) {
+        int fds[2], last = -1, n, rows_count;
+        char number[8];
+        snprintf(number, sizeof number, "%04d", round + 10);
+        char name[32];
+        snprintf(name, sizeof name, "%s.gonio", number);
+        fixture_path(&folder, name, path, sizeof path);
+        store_close(
+            created_from("campaign: { name = \"a\"; theta_i_deg = (10, 20, 30);"
+                         " theta_r: { step_deg = 0.1; }; dense: { half_width_deg = 0; }; };"),
+            NULL);
+        assert_int_equal(pipe(fds), 0);
+        pid_t child = fork();
+        if (child == 0) {
+            struct store *s;
+            close(fds[0]);
+            if (store_open(path, STORE_WRITE, &s, NULL) < 0)
+                _exit(2);
+            child_appends(fds[1], s);
+        }
+        close(fds[1]);
+        const int kill_after = (int)(rand_r(&seed) % 300);
+        while (last < kill_after && read(fds[0], &n, sizeof n) == sizeof n)
+            last = n;
+        kill(child, SIGKILL);
+        while (read(fds[0], &n, sizeof n) == sizeof n) // acknowledged before it died
+            last = n;
+        close(fds[0]);
+        waitpid(child, NULL, 0);
+        struct store_reading *rows;
+        struct store *s = opened(STORE_WRITE);
+        rows_count = store_read_readings(s, -1, &rows, NULL);
+        assert_true(last >= kill_after && rows_count >= last + 1 && rows_count <= last + 2);
+        for (int i = 0; i < rows_count; i++)
+            assert_int_equal((rows[i].sweep - 1) * 1700 + rows[i].point, i);
+        free(rows);
+        store_close(s, NULL);
+    }
+}
+
+// 240 bytes a reading are promised; measured on 10,000 rows as they are in a campaign.
+static void readings_are_small(void **state)
+{
+    (void)state;
+    struct stat before, after;
+    struct store *s =
+        created_from("campaign: { name = \"a\"; theta_i_deg = (10, 20, 30, 40, 50, 60);"
+                     " theta_r: { step_deg = 0.1; }; dense: { half_width_deg = 0; }; };");
+    store_close(s, NULL);
+    assert_int_equal(stat(path, &before), 0);
+    s = opened(STORE_WRITE);
+    int n = 0;
+    for (int sweep = 1; sweep <= 6; sweep++)
+        for (int point = 0; point < 1701 && n < 10000; point++, n++) {
+            struct store_reading r = reading(sweep, point, 1);
+            r.t_utc_ms += 150 * n;
+            r.theta_r_udeg = -85000000 + 100000 * point + 137;
+            r.signal_v = 1e-3 / (1 + 0.1234567 * point);
+            append(s, &r);
+        }
+    store_close(s, NULL);
+    assert_int_equal(stat(path, &after), 0);
+    const double bytes = (double)(after.st_size - before.st_size) / n;
+    print_message("%.1f bytes a reading\n", bytes);
+    assert_true(n == 10000 && bytes > 60 && bytes <= 240);
+}
+
+static bool count_event(void *ctx, const struct store_event *e)
+{
+    char *texts = ctx;
+    strcat(strcat(strcat(strcat(texts, e->level), " "), e->source), " ");
+    strcat(strcat(texts, e->text), ";");
+    return strlen(texts) < 60;
+}
+
+static void events_and_states_are_a_history(void **state)
+{
+    (void)state;
+    char now[16], why[80], texts[400] = "";
+    int64_t since_ms = -1;
+    struct store *s = created();
+    assert_int_equal(store_read_state(s, now, sizeof now, why, sizeof why, &since_ms, NULL), 0);
+    assert_string_equal(now, "");
+    assert_int_equal(store_append_state(s, 1000, "running", NULL, NULL), 0);
+    assert_int_equal(store_append_state(s, 2000, "paused", "laser: gone", NULL), 0);
+    assert_int_equal(store_append_state(s, 3000, "running", "", NULL), 0);
+    assert_int_equal(store_append_state(s, 4000, "paused", "axis theta_r: gone", NULL), 0);
+    assert_int_equal(store_read_state(s, now, sizeof now, why, sizeof why, &since_ms, NULL), 0);
+    assert_string_equal(now, "paused");
+    assert_string_equal(why, "axis theta_r: gone");
+    assert_int_equal(since_ms, 4000);
+    assert_int_equal(store_read_state_time(s, "running"), 1000);
+    assert_int_equal(store_read_state_time(s, "done"), 0);
+    assert_int_equal(store_append_event(s, 1, "warn", "engine", "first", NULL), 0);
+    assert_int_equal(store_append_event(s, 2, "notice", "engine", "second", NULL), 0);
+    assert_int_equal(store_append_event(s, 3, "err", "laser", "'third'; DROP TABLE reading", NULL),
+                     0);
+    assert_int_equal(store_each_event(s, 1, count_event, texts, NULL), 2);
+    assert_string_equal(texts, "notice engine second;err laser 'third'; DROP TABLE reading;");
+    store_close(s, NULL);
+}
+
+static void network_file_systems_are_known(void **state)
+{
+    (void)state;
+    assert_true(store_lock_is_network(0x6969, NULL));
+    assert_true(store_lock_is_network((long)(int)0xff534d42, NULL)); // CIFS, sign-extended
+    assert_true(store_lock_is_network(0xff534d42, NULL));
+    assert_true(store_lock_is_network(0x65735546, "fuse.sshfs"));
+    assert_false(store_lock_is_network(0x65735546, "fuse.fuse-overlayfs"));
+    assert_false(store_lock_is_network(0xef53, "ext4"));
+    assert_false(store_lock_is_network(0x01021994, "tmpfs"));
+    assert_int_equal(store_lock_local(path, NULL), 0);
+}
+
+static void flags_are_words(void **state)
+{
+    (void)state;
+    char text[100];
+    store_flags_text(STORE_SATURATED | STORE_UNLOCKED, text, sizeof text);
+    assert_string_equal(text, "saturated, no reference");
+    store_flags_text(0, text, sizeof text);
+    assert_string_equal(text, "");
+}
+
+#define TEST(f) cmocka_unit_test_setup_teardown(f, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(what_goes_in_comes_out),
+        TEST(check_values_are_as_documented),
+        TEST(the_campaign_is_kept_as_it_was),
+        TEST(the_same_row_again_is_accepted_another_is_not),
+        TEST(what_is_not_a_reading_is_refused),
+        TEST(progress_counts_accepted_readings_only),
+        TEST(closed_is_one_file_even_with_a_reader),
+        TEST(a_second_writer_is_refused_and_told_who),
+        TEST(a_new_file_never_replaces_one),
+        TEST(damage_is_named_and_nothing_is_recreated),
+        TEST(readings_cannot_be_changed_by_accident),
+        TEST(other_files_and_newer_ones_are_refused),
+        TEST(a_moved_file_is_noticed_at_the_next_reading),
+        TEST(anothers_write_lock_is_waited_for_then_named),
+        TEST(a_full_disk_loses_nothing_that_was_acknowledged),
+        TEST(killed_writers_lose_no_acknowledged_row),
+        TEST(readings_are_small),
+        TEST(events_and_states_are_a_history),
+        TEST(network_file_systems_are_known),
+        TEST(flags_are_words),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
