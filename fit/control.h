@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What every long computation of fit/ carries: has somebody asked to stop, and how much was computed.
-// One thread. After control_spend has returned true, results are worthless and callers only unwind.
+// What every long computation of fit/ carries: has somebody asked to stop, and how much was
+// computed. One thread. After control_spend has returned true, results are worthless and callers
+// only unwind.
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
@@ -16,13 +17,17 @@ struct fit_control {
 // About 0.3 ms of work at 10 ns a point and 1 ms with derivatives.
 #define CONTROL_SLICE ((size_t)32768)
 
+// For work that is not counted in points.
+static inline bool control_ask(struct fit_control *c)
+{
+    c->unchecked = 0;
+    c->stop = c->stop || (c->canceled && c->canceled(c->ctx));
+    return c->stop;
+}
+
 static inline bool control_spend(struct fit_control *c, size_t points)
 {
     c->points += (double)points;
     c->unchecked += points;
-    if (c->unchecked >= CONTROL_SLICE) {
-        c->unchecked = 0;
-        c->stop = c->stop || (c->canceled && c->canceled(c->ctx));
-    }
-    return c->stop;
+    return c->unchecked >= CONTROL_SLICE ? control_ask(c) : c->stop;
 }

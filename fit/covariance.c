@@ -25,8 +25,8 @@ static void mirror(double m[N][N])
             m[p][q] = m[q][p];
 }
 
-// H and M; the noise of a reading is u where known, else r/(1 - h) with the leverage h = J^T inverse J
-// (no leverage while inverse is NULL).
+// H and M; the noise of a reading is u where known, else r/(1 - h) with the leverage h = J^T
+// inverse J (no leverage while inverse is NULL).
 static bool accumulate(const struct fit_set *set, const double x[N], const double (*inverse)[N],
                        struct fit_control *control, double h[N][N], double m[N][N])
 {
@@ -54,8 +54,8 @@ static bool accumulate(const struct fit_set *set, const double x[N], const doubl
     return true;
 }
 
-// The pseudo-observations: in H with the noise variance that the data have along this parameter, in M with
-// its square, so that alone they would give width^2/12.
+// The pseudo-observations: in H with the noise variance that the data have along this parameter, in
+// M with its square, so that alone they would give width^2/12.
 static void add_bounds(const struct fit_space *space, const double tau[N], double h[N][N],
                        double m[N][N])
 {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The inversion: from readings f(theta_i, theta_r, dphi) to (n, k, sigma, ks, kd), with uncertainties and
-// with what the data cannot tell. This header is all that other layers need of fit/.
+// The inversion: from readings f(theta_i, theta_r, dphi) to (n, k, sigma, ks, kd), with
+// uncertainties and with what the data cannot tell. This header is all that other layers need of
+// fit/.
 //
 // Units: radians and sr^-1. No I/O, no log, no threads of its own unless options say so. Arrays in
-// fit_data are borrowed for the duration of the call. Same data, options and seed give the same result,
-// to the bit. Thread: any; calls share nothing.
+// fit_data are borrowed for the duration of the call. Same data, options and seed give the same
+// result, to the bit. Thread: any; calls share nothing.
 #pragma once
 #include "model/brdf.h"
 
@@ -15,14 +16,15 @@
 enum fit_param { FIT_N, FIT_K, FIT_SIGMA, FIT_KS, FIT_KD, FIT_PARAMS };
 
 enum fit_method {
-    FIT_MEMETIC, // variable projection for ks and kd, search in (n, sqrt k, log sigma), LM polish in k^2
+    FIT_MEMETIC, // variable projection for ks and kd, search in (n, sqrt k, log sigma), LM polish
+                 // in k^2
     FIT_PAPER    // the paper's binary genetic algorithm, for comparison
 };
 
 enum fit_weighting {
-    FIT_UNIFORM,  // g = 1
-    FIT_DENSE,    // g = dense_g where |theta_r - theta_i| <= dense_half_width, edges included; else 1
-    FIT_RELATIVE, // g = 1/f^2
+    FIT_UNIFORM, // g = 1
+    FIT_DENSE, // g = dense_g where |theta_r - theta_i| <= dense_half_width, edges included; else 1
+    FIT_RELATIVE, // g = 1/f^2; no reading may be zero
     FIT_VARIANCE  // g = 1/u^2
 };
 
@@ -52,23 +54,33 @@ struct fit_options {
     double dense_g;
     double dense_half_width_rad;
     enum brdf_diffuse diffuse;
-    struct brdf_params lower, upper; // bounds, inclusive
+    // Bounds, inclusive; equal ones hold a parameter. n and k up to 1e6, sigma in [1e-6, 1e3].
+    struct brdf_params lower, upper;
     uint64_t seed;
-    int threads;         // 1..64
-    double u_scale;      // relative standard uncertainty of a scale factor common to all readings (type B)
+    int threads; // 1..64; one thread is used whatever it says: a fit of 850 readings is 6 ms
+    double u_scale; // type B: relative standard uncertainty of a scale common to all readings
     struct fit_paper_options paper;
-    bool (*canceled)(void *ctx); // NULL: never; asked at least every 10 ms
+    bool (*canceled)(void *ctx); // NULL: never; asked every 1-2 ms of work at any size
     void *cancel_ctx;
     void (*trace)(void *ctx, int generation, double best_delta, double mean_delta); // NULL: none
     void *trace_ctx;
 };
 
+// u and the intervals hold what noise does, whatever the weights: from u_per_sr where it is known,
+// else from the residuals (robust against unequal variances). They hold nothing of what the model
+// cannot follow. On a bound: all five parameters stay free in the covariance, each with its bounds
+// as weak prior knowledge (fit/covariance.h), so that u of sigma, kd, ks_r0 and ks_r45 stays what
+// it is and u of a parameter that the data do not identify is at most that of the bounds
+// (distance/sqrt(12); for k by way of k^2). A held parameter has u = 0 and lo95 = hi95 = value. NAN
+// for u, lo95, hi95, correlation and derived u when there are no u_per_sr and no more readings than
+// free parameters: nothing tells noise then.
 struct fit_estimate {
     double value;
     double u;          // standard uncertainty: sandwich covariance, and u_scale where it applies
-    double lo95, hi95; // profile likelihood, all five parameters free; widened by u_scale where it applies
+    double lo95, hi95; // profile likelihood, all five parameters free; widened by u_scale where it
+                       // applies; within the bounds
     bool identified;   // not on a bound, and [lo95, hi95] within +-25 % of the value
-    bool at_bound;
+    bool at_bound;     // within 1e-6 of the bounds' distance
 };
 
 struct fit_derived {
@@ -81,18 +93,21 @@ enum fit_warning {
     FIT_WARN_AT_BOUND = 1 << 2,
     FIT_WARN_FEW_SWEEPS = 1 << 3,     // fewer than 3 different theta_i
     FIT_WARN_NOT_IDENTIFIED = 1 << 4, // f_00 alone does not separate n, k and ks
-    FIT_WARN_MODEL_ERROR = 1 << 5     // residuals are larger or smoother than noise: intervals miss model error
+    FIT_WARN_MODEL_ERROR = 1 << 5 // residuals larger (chi2, with u_per_sr) or smoother than noise
 };
 
+// FIT_PAPER reports params, delta and u of what its algorithm ended with; lo95 and hi95 belong to
+// the data and so to the optimum next to it, and need not include it.
 struct fit_result {
     struct brdf_params params;
     double delta; // eq. 17 with the weights given, at params
     struct fit_estimate estimate[FIT_PARAMS];
-    struct fit_derived ks_r0, ks_r45;        // ks times mean Fresnel reflectance at beta = 0 and 45 deg
+    struct fit_derived ks_r0, ks_r45; // ks times mean Fresnel reflectance at beta = 0 and 45 deg
     struct fit_derived dhr_0, dhr_45, dhr_60; // directional-hemispherical reflectance of the fit
     double correlation[FIT_PARAMS][FIT_PARAMS];
     double chi2_per_dof;    // NAN without u_per_sr
-    double residual_lag1;   // autocorrelation of neighbouring residuals within a sweep
+    double residual_lag1; // autocorrelation of neighbouring weighted residuals within a sweep; NAN:
+                          // none
     unsigned warnings;      // of fit_warning
     long evaluations;       // of the whole data set
     double elapsed_ms;       // search and polish
@@ -104,14 +119,17 @@ enum fit_stop {
     FIT_OK = 0,
     FIT_E_FEW_POINTS = -1, // fewer points than parameters
     FIT_E_ALL_ZERO = -2,   // eq. 17 has no denominator
-    FIT_E_DATA = -3,       // a NAN or infinite value, theta outside [0, pi/2), u <= 0
-    FIT_E_OPTIONS = -4,    // empty or negative bounds, variance weighting without u, ...
+    FIT_E_DATA =
+        -3, // a NAN or infinite value, theta outside [0, pi/2), u <= 0, f = 0 when relative
+    FIT_E_OPTIONS = -4, // empty or negative bounds, variance weighting without u, ...
     FIT_E_CANCELED = -5,
     FIT_E_MEMORY = -6
 };
 
-struct fit_options fit_options_default(void); // memetic, uniform, paper's diffuse, bounds of the manual, seed 1
-int fit_run(const struct fit_data *data, const struct fit_options *options, struct fit_result *ret_result);
+struct fit_options
+fit_options_default(void); // memetic, uniform, paper's diffuse, bounds of the manual, seed 1
+int fit_run(const struct fit_data *data, const struct fit_options *options,
+            struct fit_result *ret_result);
 const char *fit_stop_text(int stop);
 const char *fit_param_name(enum fit_param p); // "n", "k", "sigma", "ks", "kd"
 
@@ -119,6 +137,7 @@ const char *fit_param_name(enum fit_param p); // "n", "k", "sigma", "ks", "kd"
 // Returns the length that snprintf would.
 int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text, size_t size);
 
-// Eq. 17 at given parameters: sum g (model - f)^2 / sum g f^2. Negative fit_stop on bad data.
-int fit_delta(const struct fit_data *data, const struct fit_options *options, const struct brdf_params *p,
-              double *ret_delta);
+// Eq. 17 at given parameters: sum g (model - f)^2 / sum g f^2; NAN outside the model's domain.
+// Bounds are checked but p need not lie within them. Negative fit_stop on bad data.
+int fit_delta(const struct fit_data *data, const struct fit_options *options,
+              const struct brdf_params *p, double *ret_delta);

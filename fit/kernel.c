@@ -55,7 +55,8 @@ static inline double exp_negative(double x)
     return p * scale;
 }
 
-// See brdf_fresnel_mean. 1e-300 keeps the one place of total reflection at grazing incidence finite.
+// See brdf_fresnel_mean. 1e-300 keeps the one place of total reflection at grazing incidence
+// finite.
 static inline double fresnel(const struct point *p, double s2, double c2)
 {
     double re = p->re - s2;
@@ -133,7 +134,8 @@ static double dot(const double *restrict x, const double *restrict y, size_t cou
     for (size_t i = 0; i < count; i += SET_LANES)
         for (int j = 0; j < SET_LANES; j++)
             lane[j] += x[i + (size_t)j] * y[i + (size_t)j];
-    return ((lane[0] + lane[4]) + (lane[1] + lane[5])) + ((lane[2] + lane[6]) + (lane[3] + lane[7]));
+    return ((lane[0] + lane[4]) + (lane[1] + lane[5])) +
+           ((lane[2] + lane[6]) + (lane[3] + lane[7]));
 }
 
 static size_t block_length(const struct fit_set *set, size_t at)

@@ -3,10 +3,11 @@
 // a_i = sqrt(g) v A exp(-v tan^2 theta) F(beta) at (n, k^2, log sigma), its derivatives, and inner
 // products of these with the diffuse column b and the residuals r = f - ks a - kd b.
 //
-// Plain C over blocks that stay in the first-level cache, written so that the compiler vectorises it;
-// sums run in SET_LANES fixed lanes, so that the vector's width does not change a bit of the result.
-// The exponential is a polynomial of its own (relative error below 1e-13, arguments below -150 taken
-// for -150): reported values come from model/brdf.h, not from here. Nothing allocates. Any thread.
+// Plain C over blocks that stay in the first-level cache, written so that the compiler vectorises
+// it; sums run in SET_LANES fixed lanes, so that the vector's width does not change a bit of the
+// result. The exponential is a polynomial of its own (relative error below 1e-13, arguments below
+// -150 taken for -150): reported values come from model/brdf.h, not from here. Nothing allocates.
+// Any thread.
 #pragma once
 #include "fit/control.h"
 #include "fit/set.h"
@@ -29,8 +30,9 @@ bool kernel_gram(const struct fit_set *set, const double x[FIT_PARAMS], struct f
 
 #define KERNEL_BLOCK 128
 
-// One block from reading `at` (a multiple of SET_LANES) on, for sums of other kinds: the derivatives of
-// the model by x (ks multiplied in where it belongs) and the residuals. Returns the block's length.
+// One block from reading `at` (a multiple of SET_LANES) on, for sums of other kinds: the
+// derivatives of the model by x (ks multiplied in where it belongs) and the residuals. Returns the
+// block's length.
 struct kernel_block {
     double j[FIT_PARAMS][KERNEL_BLOCK];
     double r[KERNEL_BLOCK];

@@ -79,8 +79,8 @@ static double reflect(double t)
     return t > 1 ? 2 - t : t;
 }
 
-// Two children on the line through the parents and a little beyond (blend crossover), one gene in two
-// shaken.
+// Two children on the line through the parents and a little beyond (blend crossover), one gene in
+// two shaken.
 static void breed(struct search *s, const struct individual *a, const struct individual *b,
                   struct individual child[2])
 {
@@ -126,7 +126,7 @@ static void trace(const struct search *s, const struct fit_options *o, int numbe
 {
     if (!o->trace)
         return;
-    double best = INFINITY, sum = 0;
+    double best = (double)INFINITY, sum = 0;
     for (int i = 0; i < s->population; i++) {
         best = fmin(best, s->all[i].at.q);
         sum += s->all[i].at.q;
@@ -146,8 +146,8 @@ static int by_optimum(const void *a, const void *b)
     return (p > q) - (p < q);
 }
 
-// The best individual of each niche, best first: greedily, no two nearer than a radius that shrinks until
-// enough are found.
+// The best individual of each niche, best first: greedily, no two nearer than a radius that shrinks
+// until enough are found.
 static int pick_niches(struct search *s, struct fit_optimum *ret_niche)
 {
     int picked[NICHES_MAX], count = 0;
@@ -165,7 +165,8 @@ static int pick_niches(struct search *s, struct fit_optimum *ret_niche)
     return count;
 }
 
-// Every niche a few steps, the best of them to the end. Returns how many are in order, 0 when canceled.
+// Every niche a few steps, the best of them to the end. Returns how many are in order, 0 when
+// canceled.
 static int polish_niches(struct search *s, struct fit_optimum *niche)
 {
     int count = pick_niches(s, niche);

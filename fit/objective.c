@@ -16,7 +16,7 @@ int objective_delta(const struct fit_set *set, const struct brdf_params *p,
 {
     double sum = 0;
     for (size_t i = 0; i < set->count; i++) {
-        if (i % (CONTROL_SLICE / 4) == 0 && control_spend(control, CONTROL_SLICE))
+        if (i % (CONTROL_SLICE / 4) == 0 && control_ask(control))
             return FIT_E_CANCELED;
         double r = objective_residual(set, p, i);
         sum += r * r;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Eq. 17 at given parameters with the model's own arithmetic (model/brdf.h), residual by residual: what is
-// reported. The searches use the kernel's sums, which agree with it to 1e-12 of sum g f^2.
+// Eq. 17 at given parameters with the model's own arithmetic (model/brdf.h), residual by residual:
+// what is reported. The searches use the kernel's sums, which agree with it to 1e-12 of sum g f^2.
 #pragma once
 #include "fit/control.h"
 #include "fit/set.h"

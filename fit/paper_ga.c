@@ -50,7 +50,8 @@ static double fitness(const struct chromosome *c)
     return 1 / (c->delta + 1e-300);
 }
 
-// Scaling 1 is Goldberg's: a straight line that keeps the mean and lifts the best to twice the mean.
+// Scaling 1 is Goldberg's: a straight line that keeps the mean and lifts the best to twice the
+// mean.
 static void spin_up(struct ga *ga)
 {
     double sum = 0, best = 0;
@@ -88,7 +89,7 @@ static void cross(struct ga *ga, struct chromosome *a, struct chromosome *b)
     int bits = ga->o->bits;
     int at = 1 + (int)rng_below(&ga->rng, (uint64_t)(bits * FIT_PARAMS - 1));
     for (int g = 0; g < FIT_PARAMS; g++) {
-        int from = at - g * bits; // the bits of this gene before `from` stay, most significant first
+        int from = at - g * bits; // this gene's bits before it stay, most significant first
         uint32_t stay = from <= 0 ? 0 : from >= bits ? UINT32_MAX : ~0u << (bits - from);
         uint32_t swap = (a->gene[g] ^ b->gene[g]) & ~stay;
         a->gene[g] ^= swap;
@@ -146,7 +147,7 @@ static void trace(const struct ga *ga, const struct fit_options *o, int number)
 {
     if (!o->trace)
         return;
-    double best = INFINITY, sum = 0;
+    double best = (double)INFINITY, sum = 0;
     for (int i = 0; i < ga->o->population; i++) {
         best = fmin(best, ga->now[i].delta);
         sum += ga->now[i].delta;
@@ -164,11 +165,15 @@ int paper_ga_search(const struct fit_set *set, const struct fit_space *space,
     ga.wheel = calloc(size, sizeof *ga.wheel);
     ga.now = memory;
     ga.next = memory ? memory + size : NULL;
-    ga.best.delta = INFINITY;
+    ga.best.delta = (double)INFINITY;
     rng_seed(&ga.rng, options->seed);
     for (int i = 0; i < FIT_PARAMS; i++) {
-        ga.lower[i] = i == FIT_K ? sqrt(space->lower[i]) : i == FIT_SIGMA ? exp(space->lower[i]) : space->lower[i];
-        ga.upper[i] = i == FIT_K ? sqrt(space->upper[i]) : i == FIT_SIGMA ? exp(space->upper[i]) : space->upper[i];
+        ga.lower[i] = i == FIT_K       ? sqrt(space->lower[i])
+                      : i == FIT_SIGMA ? exp(space->lower[i])
+                                       : space->lower[i];
+        ga.upper[i] = i == FIT_K       ? sqrt(space->upper[i])
+                      : i == FIT_SIGMA ? exp(space->upper[i])
+                                       : space->upper[i];
     }
     int stop = memory && ga.wheel ? FIT_E_CANCELED : FIT_E_MEMORY;
     if (stop == FIT_E_MEMORY || !populate(&ga))

@@ -9,13 +9,14 @@
 enum { N = FIT_PARAMS, NONLINEAR = 3 }; // FIT_N, FIT_K, FIT_SIGMA come first in every array
 #define DONE 1e-11
 
-// Where the polish stands. ks and kd are the best for its n, k, sigma; they take part in the step because
-// near their bounds it must know that they cannot follow. Inside, it is the projected step exactly.
+// Where the polish stands. ks and kd are the best for its n, k, sigma; they take part in the step
+// because near their bounds it must know that they cannot follow. Inside, it is the projected step
+// exactly.
 struct state {
     struct fit_optimum at;
     double s[N][N]; // J^T J
     double g[N];    // J^T r: downhill
-    double damp[N]; // Marquardt's scaling: the diagonal of S with ks and kd projected out, 0 for these
+    double damp[N]; // Marquardt's scaling: diag S with ks and kd projected out, 0 for these
 };
 
 static double clamp(double v, double low, double high)
@@ -23,7 +24,8 @@ static double clamp(double v, double low, double high)
     return v < low ? low : v > high ? high : v;
 }
 
-// What of <u, u> is left when the free ones of ks and kd follow: u given by its products with a, b and u.
+// What of <u, u> is left when the free ones of ks and kd follow: u given by its products with a, b
+// and u.
 static double left_over(const struct kernel_gram *gram, const struct varpro *v, const double *u,
                         double uu)
 {
@@ -56,7 +58,8 @@ static bool evaluate(const struct fit_set *set, const struct fit_space *space,
         ret->g[i] = scale[i] * (m[KERNEL_R] - ds * m[KERNEL_A] - dd * m[KERNEL_B]);
         for (int j = 0; j < N; j++)
             ret->s[i][j] = scale[i] * scale[j] * m[column[j]];
-        ret->damp[i] = i < NONLINEAR ? scale[i] * scale[i] * left_over(&gram, &v, m, m[column[i]]) : 0;
+        ret->damp[i] =
+            i < NONLINEAR ? scale[i] * scale[i] * left_over(&gram, &v, m, m[column[i]]) : 0;
     }
     memcpy(ret->at.x, x, sizeof ret->at.x);
     ret->at.x[FIT_KS] = v.ks;
@@ -65,7 +68,8 @@ static bool evaluate(const struct fit_set *set, const struct fit_space *space,
     return true;
 }
 
-// Solves (S + lambda damp) d = rhs over the coordinates in use, by Cholesky; false when not positive.
+// Solves (S + lambda damp) d = rhs over the coordinates in use, by Cholesky; false when not
+// positive.
 static bool solve(const struct state *st, double lambda, const bool use[N],
                   const double rhs[N], double d[N])
 {
@@ -95,8 +99,8 @@ static bool solve(const struct state *st, double lambda, const bool use[N],
     return true;
 }
 
-// The damped step within the bounds: a coordinate that would leave goes to its bound and the others are
-// solved again; one that sits on its bound and would leave stays.
+// The damped step within the bounds: a coordinate that would leave goes to its bound and the others
+// are solved again; one that sits on its bound and would leave stays.
 static bool bounded_step(const struct state *st, const struct fit_space *space, double lambda,
                          double d[N], bool *ret_clipped)
 {
@@ -114,7 +118,8 @@ static bool bounded_step(const struct state *st, const struct fit_space *space, 
             return false;
         int out = -1;
         for (int i = 0; i < N && out < 0; i++)
-            if (use[i] && (st->at.x[i] + d[i] < space->lower[i] || st->at.x[i] + d[i] > space->upper[i]))
+            if (use[i] &&
+                (st->at.x[i] + d[i] < space->lower[i] || st->at.x[i] + d[i] > space->upper[i]))
                 out = i;
         for (int i = 0; i < N; i++)
             d[i] = use[i] ? d[i] : held[i];

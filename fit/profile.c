@@ -30,7 +30,8 @@ static double inside(enum fit_param which, double value)
     return which == FIT_K ? value * value : which == FIT_SIGMA ? log(value) : value;
 }
 
-// Student's t for 97.5 % (Cornish and Fisher; within 1 % from 3 degrees on), the normal's for known u.
+// Student's t for 97.5 % (Cornish and Fisher; within 1 % from 3 degrees on), the normal's for known
+// u.
 static double quantile_of(const struct fit_set *set, double dof)
 {
     const double z = 1.959963984540054;
@@ -66,13 +67,16 @@ static void note_reached(struct walk *w, const struct fit_optimum *at)
     }
 }
 
-// One end. z grows about linearly with the distance, so a secant on z, kept between what was bracketed.
+// One end. z grows about linearly with the distance, so a secant on z, kept between what was
+// bracketed.
 static bool find_end(struct walk *w, double direction, double u, double *ret_end,
                      struct fit_optimum *ret_lowest)
 {
     double centre = outside(w->which, w->best->x[w->which]);
-    double bound = outside(w->which, direction < 0 ? w->space->lower[w->which] : w->space->upper[w->which]);
-    double room = fabs(bound - centre), inner = 0, inner_z = 0, outer = INFINITY, outer_z = INFINITY;
+    double bound =
+        outside(w->which, direction < 0 ? w->space->lower[w->which] : w->space->upper[w->which]);
+    double room = fabs(bound - centre), inner = 0, inner_z = 0, outer = (double)INFINITY,
+           outer_z = (double)INFINITY;
     double distance = fmin(w->quantile * u, room);
     struct fit_optimum at = *w->best;
     *ret_end = bound;
@@ -112,7 +116,9 @@ static bool find_end(struct walk *w, double direction, double u, double *ret_end
 // u of the parameter itself, from its coordinate's.
 static double first_step(enum fit_param which, double x, double spread)
 {
-    return which == FIT_K ? sqrt(x + spread) - sqrt(x) : which == FIT_SIGMA ? exp(x) * spread : spread;
+    return which == FIT_K       ? sqrt(x + spread) - sqrt(x)
+           : which == FIT_SIGMA ? exp(x) * spread
+                                : spread;
 }
 
 static bool one_interval(struct walk *w, struct fit_optimum *lowest, struct profile *ret_profile)

@@ -74,7 +74,7 @@ int residuals_study(const struct fit_data *data, const struct fit_set *set,
     if (sorted && !all)
         return FIT_E_MEMORY;
     for (size_t i = 0; i < set->count; i++) {
-        if (i % (CONTROL_SLICE / 8) == 0 && control_spend(control, CONTROL_SLICE)) {
+        if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control)) {
             free(all);
             return FIT_E_CANCELED;
         }

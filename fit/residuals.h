@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the residuals say of the model: noise is not smooth. Neighbours are readings of one theta_i and one
-// azimuth plane next to each other in angle; above RESIDUALS_SORT_MAX readings, next to each other in the
-// order given (a sort could not be interrupted).
+// What the residuals say of the model: noise is not smooth. Neighbours are readings of one theta_i
+// and one azimuth plane next to each other in angle; above RESIDUALS_SORT_MAX readings, next to
+// each other in the order given (a sort could not be interrupted).
 #pragma once
 #include "fit/control.h"
 #include "fit/set.h"

@@ -70,9 +70,9 @@ static int check_readings(const struct fit_data *d, const struct fit_options *o,
 {
     if (d->count < FIT_PARAMS)
         return FIT_E_FEW_POINTS;
-    double unit = INFINITY, largest = 0;
+    double unit = (double)INFINITY, largest = 0;
     for (size_t i = 0; i < d->count; i++) {
-        if (i % CONTROL_SLICE == 0 && control_spend(control, CONTROL_SLICE))
+        if (i % CONTROL_SLICE == 0 && control_ask(control))
             return FIT_E_CANCELED;
         if (!reading_ok(d, o, i))
             return FIT_E_DATA;
@@ -128,7 +128,7 @@ int set_compile(const struct fit_data *d, const struct fit_options *o, struct fi
         s.g_scale = fmax(1, o->dense_g);
     for (size_t i = 0; i < d->count; i++) {
         // Trigonometry: some 100 ns a reading, so the slice is shorter.
-        if (i % (CONTROL_SLICE / 8) == 0 && control_spend(control, CONTROL_SLICE)) {
+        if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control)) {
             set_free(&s);
             return FIT_E_CANCELED;
         }
@@ -139,7 +139,6 @@ int set_compile(const struct fit_data *d, const struct fit_options *o, struct fi
         set_free(&s);
         return FIT_E_ALL_ZERO;
     }
-    control->points = 0;
     *ret_set = s;
     return 0;
 }
@@ -157,7 +156,7 @@ int set_sample(const struct fit_set *set, size_t count, uint64_t seed, struct fi
         return e;
     size_t taken = 0;
     for (size_t i = 0; taken < count; i++) { // selection sampling (Knuth 3.4.2 S)
-        if (i % CONTROL_SLICE == 0 && control_spend(control, CONTROL_SLICE)) {
+        if (i % CONTROL_SLICE == 0 && control_ask(control)) {
             set_free(&s);
             return FIT_E_CANCELED;
         }

@@ -13,8 +13,8 @@ const char *fit_stop_text(int stop)
     case FIT_E_ALL_ZERO:
         return "every reading is zero: eq. 17 has no denominator; is this the right column?";
     case FIT_E_DATA:
-        return "a reading that is no finite number, an angle outside [0, 90) deg, an uncertainty that is "
-               "not above zero, or a zero reading under relative weights";
+        return "a reading that is no finite number, an angle outside [0, 90) deg, an uncertainty "
+               "that is not above zero, or a zero reading under relative weights";
     case FIT_E_OPTIONS:
         return "options out of range: bounds need 0 < lower <= upper, variance weights need an "
                "uncertainty for every reading";
@@ -39,8 +39,8 @@ static void list(const struct fit_result *r, bool (*wanted)(const struct fit_est
     for (int i = 0; i < count && length < 120; i++) {
         const struct fit_estimate *e = &r->estimate[which[i]];
         if (wanted(e))
-            length += snprintf(text + length, 160 - (size_t)length, "%s%s = %.4g", length ? ", " : "",
-                               fit_param_name(which[i]), e->value);
+            length += snprintf(text + length, 160 - (size_t)length, "%s%s = %.4g",
+                               length ? ", " : "", fit_param_name(which[i]), e->value);
     }
 }
 
@@ -58,7 +58,8 @@ static int model_error_text(const struct fit_result *r, char *text, size_t size)
 {
     static const char advice[] = "the intervals hold noise only, not what the model cannot follow";
     if (isnan(r->chi2_per_dof))
-        return snprintf(text, size, "Residuals are smoother than noise (neighbours correlate by %.2f): %s.",
+        return snprintf(text, size,
+                        "Residuals are smoother than noise (neighbours correlate by %.2f): %s.",
                         r->residual_lag1, advice);
     return snprintf(text, size,
                     "Residuals are larger or smoother than noise (chi2 per degree of freedom %.3g, "
@@ -73,29 +74,34 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
     char names[160];
     switch (w) {
     case FIT_WARN_DHR_ABOVE_ONE:
-        return snprintf(text, size,
-                        "The fitted surface reflects more than it receives (directional-hemispherical "
-                        "reflectance %.3f at 0, %.3f at 45, %.3f at 60 deg): do not extrapolate it%s.",
-                        r->dhr_0.value, r->dhr_45.value, r->dhr_60.value,
-                        r->params.kd > 0 ? ", or try the Lambert form of the diffuse part" : "");
+        return snprintf(
+            text, size,
+            "The fitted surface reflects more than it receives (directional-hemispherical "
+            "reflectance %.3f at 0, %.3f at 45, %.3f at 60 deg): do not extrapolate it%s.",
+            r->dhr_0.value, r->dhr_45.value, r->dhr_60.value,
+            r->params.kd > 0 ? ", or try the Lambert form of the diffuse part" : "");
     case FIT_WARN_N_BELOW_ONE:
-        return snprintf(text, size,
-                        "n = %.3f is below 1, unphysical for a paint or a dielectric: the model does not "
-                        "describe this sample, or n is not identified; consider a lower bound of 1.",
-                        r->params.n);
+        return snprintf(
+            text, size,
+            "n = %.3f is below 1, unphysical for a paint or a dielectric: the model does not "
+            "describe this sample, or n is not identified; consider a lower bound of 1.",
+            r->params.n);
     case FIT_WARN_AT_BOUND:
         list(r, at_bound, all, 5, names);
-        return snprintf(text, size, "On a bound: %s; widen the bounds or measure more angles.", names);
+        return snprintf(text, size, "On a bound: %s; widen the bounds or measure more angles.",
+                        names);
     case FIT_WARN_FEW_SWEEPS:
-        return snprintf(text, size,
-                        "Fewer than 3 angles of incidence: reflectance and diffuse part cannot be told "
-                        "apart reliably; measure more sweeps.");
+        return snprintf(
+            text, size,
+            "Fewer than 3 angles of incidence: reflectance and diffuse part cannot be told "
+            "apart reliably; measure more sweeps.");
     case FIT_WARN_NOT_IDENTIFIED:
         list(r, unidentified, optical, 3, names);
-        return snprintf(text, size,
-                        "f_00 alone does not separate n, k and ks (%s); use sigma = %.4g, kd = %.4g and "
-                        "ks R(45 deg) = %.4g, or measure polarised or up to 80 deg.",
-                        names, r->params.sigma, r->params.kd, r->ks_r45.value);
+        return snprintf(
+            text, size,
+            "f_00 alone does not separate n, k and ks (%s); use sigma = %.4g, kd = %.4g and "
+            "ks R(45 deg) = %.4g, or measure polarised or up to 80 deg.",
+            names, r->params.sigma, r->params.kd, r->ks_r45.value);
     case FIT_WARN_MODEL_ERROR: return model_error_text(r, text, size);
     }
     return snprintf(text, size, "unknown warning %u", (unsigned)w);

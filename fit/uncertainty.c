@@ -79,8 +79,9 @@ static double dhr_at(const double x[FIT_PARAMS], enum brdf_diffuse diffuse, doub
     return brdf_dhr(&p, diffuse, theta_i_rad);
 }
 
-// Along each axis of the covariance by a small part of it (at most 2 % of a parameter), so that the long,
-// compensating changes of n, k and ks cancel in the parameters and not between large derivatives.
+// Along each axis of the covariance by a small part of it (at most 2 % of a parameter), so that the
+// long, compensating changes of n, k and ks cancel in the parameters and not between large
+// derivatives.
 static double dhr_slope(const double x[FIT_PARAMS], const double axis[FIT_PARAMS], double centre,
                         enum brdf_diffuse diffuse, double theta_i_rad)
 {
@@ -95,8 +96,10 @@ static double dhr_slope(const double x[FIT_PARAMS], const double axis[FIT_PARAMS
     return upward || downward ? (high - low) / (t * (upward + downward)) : 0;
 }
 
+// Each reflectance is some 0.2 ms of quadrature.
 static struct fit_derived dhr(const struct covariance *cov, const struct brdf_params *p,
-                              enum brdf_diffuse diffuse, double theta_i_rad)
+                              enum brdf_diffuse diffuse, double theta_i_rad,
+                              struct fit_control *control)
 {
     double axis[FIT_PARAMS][FIT_PARAMS], x[FIT_PARAMS], sum = 0;
     double centre = brdf_dhr(p, diffuse, theta_i_rad);
@@ -105,7 +108,7 @@ static struct fit_derived dhr(const struct covariance *cov, const struct brdf_pa
         if (isnan(cov->c[i][i]))
             return (struct fit_derived){centre, (double)NAN};
     covariance_axes(cov, axis);
-    for (int i = 0; i < FIT_PARAMS; i++) {
+    for (int i = 0; i < FIT_PARAMS && !control_ask(control); i++) {
         double slope = dhr_slope(x, axis[i], centre, diffuse, theta_i_rad);
         sum += slope * slope;
     }
@@ -140,7 +143,7 @@ static void fill_warnings(const struct fit_options *o, const struct residuals *r
     if (r->params.n < 1)
         r->warnings |= FIT_WARN_N_BELOW_ONE;
     for (int i = 0; i < FIT_PARAMS; i++) {
-        bool held = !(*param_of(&low, i) < *param_of(&high, i)); // by whoever asked, not by the data
+        bool held = !(*param_of(&low, i) < *param_of(&high, i)); // by options, not by the data
         if (!held && r->estimate[i].at_bound)
             r->warnings |= FIT_WARN_AT_BOUND;
         if (!held && !r->estimate[i].identified && (i == FIT_N || i == FIT_K || i == FIT_KS))
@@ -180,8 +183,8 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
     struct covariance cov;
     struct profile profile[FIT_PARAMS];
     struct residuals res;
-    // The paper's algorithm stops short of an optimum: likelihoods belong to the optimum next to it, the
-    // covariance to what it reports.
+    // The paper's algorithm stops short of an optimum: likelihoods belong to the optimum next to
+    // it, the covariance to what it reports.
     if (options->method == FIT_PAPER && !polish(set, &space, 200, control, &top))
         return FIT_E_CANCELED;
     if (!explore(set, &space, control, &top, &cov, profile))
@@ -203,9 +206,11 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
     fill_correlation(&cov, &r);
     r.ks_r0 = ks_reflectance(&cov, &r.params, 0);
     r.ks_r45 = ks_reflectance(&cov, &r.params, PI / 4);
-    r.dhr_0 = dhr(&cov, &r.params, options->diffuse, 0);
-    r.dhr_45 = dhr(&cov, &r.params, options->diffuse, PI / 4);
-    r.dhr_60 = dhr(&cov, &r.params, options->diffuse, PI / 3);
+    r.dhr_0 = dhr(&cov, &r.params, options->diffuse, 0, control);
+    r.dhr_45 = dhr(&cov, &r.params, options->diffuse, PI / 4, control);
+    r.dhr_60 = dhr(&cov, &r.params, options->diffuse, PI / 3, control);
+    if (control->stop)
+        return FIT_E_CANCELED;
     r.chi2_per_dof = cov.dof >= 1 ? res.chi2 / cov.dof : (double)NAN;
     r.residual_lag1 = res.lag1;
     fill_warnings(options, &res, cov.dof, &r);

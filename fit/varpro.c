@@ -22,8 +22,9 @@ static double along(double curvature, double slope, double low, double high)
     return curvature > 0 ? clamp(slope / curvature, low, high) : clamp(0, low, high);
 }
 
-// A convex quadratic over a box is least at its stationary point when that lies inside, else on an edge;
-// a degenerate one (a and b parallel) is least on an edge too, as its valley leaves the box there.
+// A convex quadratic over a box is least at its stationary point when that lies inside, else on an
+// edge; a degenerate one (a and b parallel) is least on an edge too, as its valley leaves the box
+// there.
 static double solve_box(const struct quadratic *q, const double low[2], const double high[2],
                         double ret_step[2])
 {
@@ -36,7 +37,7 @@ static double solve_box(const struct quadratic *q, const double low[2], const do
             return change(q, s, d);
         }
     }
-    double best = INFINITY;
+    double best = (double)INFINITY;
     for (int edge = 0; edge < 4; edge++) {
         double s = edge & 1 ? high[0] : low[0], d = edge & 1 ? high[1] : low[1];
         if (edge < 2)

@@ -16,7 +16,8 @@ static bool is_polar_angle(double theta_rad)
 struct brdf_geometry brdf_geometry(double theta_i_rad, double theta_r_rad, double dphi_rad)
 {
     if (!is_polar_angle(theta_i_rad) || !is_polar_angle(theta_r_rad) || !isfinite(dphi_rad))
-        return (struct brdf_geometry){NAN, NAN, NAN, NAN, NAN};
+        return (struct brdf_geometry){(double)NAN, (double)NAN, (double)NAN, (double)NAN,
+                                      (double)NAN};
     double si = sin(theta_i_rad), ci = cos(theta_i_rad);
     double sr = sin(theta_r_rad), cr = cos(theta_r_rad);
     double rx = sr * cos(dphi_rad), ry = sr * sin(dphi_rad);
@@ -36,13 +37,13 @@ struct brdf_geometry brdf_geometry(double theta_i_rad, double theta_r_rad, doubl
     };
 }
 
-// With D = n^2 - k^2 - sin^2, m = |N^2 - sin^2|, Y = 2 cos Re q, X = m + cos^2, Z = m cos^2 + sin^4 the
-// mean of the two reflectances is (X - Y) Z / ((X + Y)(Z + Y sin^2)). X - Y vanishes as n -> 1; but
-// X^2 - Y^2 = (n^2 - k^2 - 1)^2 + 4 n^2 k^2 whatever beta, and that has no cancellation.
+// With D = n^2 - k^2 - sin^2, m = |N^2 - sin^2|, Y = 2 cos Re q, X = m + cos^2, Z = m cos^2 + sin^4
+// the mean of the two reflectances is (X - Y) Z / ((X + Y)(Z + Y sin^2)). X - Y vanishes as n -> 1;
+// but X^2 - Y^2 = (n^2 - k^2 - 1)^2 + 4 n^2 k^2 whatever beta, and that has no cancellation.
 double brdf_fresnel_mean(double n, double k, double sin2_beta, double cos2_beta)
 {
     if (!(n > 0 && n <= BRDF_INDEX_MAX && k >= 0 && k <= BRDF_INDEX_MAX))
-        return NAN;
+        return (double)NAN;
     double im = 2 * n * k; // of N^2
     double re = (n - k) * (n + k) - sin2_beta;
     double m = sqrt(re * re + im * im);
@@ -66,7 +67,7 @@ double brdf_f00(const struct brdf_params *p, enum brdf_diffuse diffuse,
                 const struct brdf_geometry *g)
 {
     if (!in_domain(p))
-        return NAN;
+        return (double)NAN;
     double v = 1 / (2 * p->sigma * p->sigma);
     double fresnel = brdf_fresnel_mean(p->n, p->k, g->sin2_beta, g->cos2_beta);
     double specular = p->ks * v * g->spec_per_sr * exp(-v * g->tan2_theta) * fresnel;

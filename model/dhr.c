@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Directional-hemispherical reflectance by quadrature over the slopes (x, y) of the facets, where the
-// Gaussian is round and narrow whatever theta_i. With rho^2 = x^2 + y^2, q = 1 + x tan theta_i,
+// Directional-hemispherical reflectance by quadrature over the slopes (x, y) of the facets, where
+// the Gaussian is round and narrow whatever theta_i. With rho^2 = x^2 + y^2, q = 1 + x tan theta_i,
 //
 //   DHR = ks integral (v/pi) exp(-v rho^2) F(beta) min(q, 4 q/(1 + rho^2) - 2, 2) dx dy + diffuse,
 //
-// because cos beta = q cos theta_i cos theta, d omega_r = 4 cos beta d omega_h = 4 cos beta cos^3 theta
-// dx dy, and cos theta_r = 2 cos beta cos theta - cos theta_i. The three terms of the minimum are G = 1,
-// G limited by theta_r, and G limited by theta_i. The minimum has kinks, whose places in y are known for
-// each x: the inner integral is split there, and the outer one where a kink enters or leaves.
+// because cos beta = q cos theta_i cos theta, d omega_r = 4 cos beta d omega_h = 4 cos beta cos^3
+// theta dx dy, and cos theta_r = 2 cos beta cos theta - cos theta_i. The three terms of the minimum
+// are G = 1, G limited by theta_r, and G limited by theta_i. The minimum has kinks, whose places in
+// y are known for each x: the inner integral is split there, and the outer one where a kink enters
+// or leaves.
 #include "model/brdf.h"
 
 #include <math.h>
@@ -33,7 +34,8 @@ static const double weight[NODES / 2] = {
     0.10158371336153296, 0.11674626826917740, 0.12457352290670139,
 };
 
-// Substitutes u = s^2 (3 - 2 s), which flattens square-root ends (total reflection, kinks that leave).
+// Substitutes u = s^2 (3 - 2 s), which flattens square-root ends (total reflection, kinks that
+// leave).
 static double smooth_node(int i, double *ret_weight)
 {
     double s = i < NODES / 2 ? node[i] : 1 - node[NODES - 1 - i];
@@ -63,7 +65,8 @@ static double inner_piece(const struct dhr *d, double x, double q, double from, 
     return sum * (to - from);
 }
 
-// Over y in [0, ymax], split at the kink of G, at the critical angle, and into halves when it is long.
+// Over y in [0, ymax], split at the kink of G, at the critical angle, and into halves when it is
+// long.
 static double inner(const struct dhr *d, double x)
 {
     double q = 1 + x * d->tan_i;
@@ -107,21 +110,27 @@ static double outer(const struct dhr *d, double from, double to, double whole, i
 {
     double mid = (from + to) / 2;
     double left = outer_rule(d, from, mid), right = outer_rule(d, mid, to);
-    // Halving gains at least a factor of 2^3 even at a kink that was missed: the error left is far less.
+    // Halving gains at least a factor of 2^3 even at a kink that was missed: the error left is far
+    // less.
     if (depth <= 0 || fabs(left + right - whole) < 1e-7)
         return left + right;
     return outer(d, from, mid, left, depth - 1) + outer(d, mid, to, right, depth - 1);
 }
 
-// The places in x where a kink or the edge of the hemisphere crosses y = 0, in rising order within +-reach.
+// The places in x where a kink or the edge of the hemisphere crosses y = 0, in rising order within
+// +-reach.
 static int outer_cuts(const struct dhr *d, double theta_i_rad, double *ret_cut)
 {
     double t = theta_i_rad;
     double special[8] = {
         0, // also G = 1 meets G limited by theta_i
-        tan(t), tan((t - PI / 2) / 2), tan((t + PI / 2) / 2), // cos theta_r = 0: facets that mirror to 90 deg
+        tan(t),
+        tan((t - PI / 2) / 2),
+        tan((t + PI / 2) / 2), // cos theta_r = 0: facets that mirror to 90 deg
         1 / d->tan_i,
-        tan((t - PI / 2) / 3), tan((t + PI / 2) / 3), -1 / d->tan_i, // G limited by theta_r begins
+        tan((t - PI / 2) / 3),
+        tan((t + PI / 2) / 3),
+        -1 / d->tan_i, // G limited by theta_r begins
     };
     int count = 0;
     ret_cut[count++] = -d->reach;
@@ -142,7 +151,7 @@ double brdf_dhr(const struct brdf_params *p, enum brdf_diffuse diffuse, double t
 {
     struct brdf_geometry normal = brdf_geometry(theta_i_rad, 0, PI);
     if (isnan(brdf_f00(p, diffuse, &normal)))
-        return NAN;
+        return (double)NAN;
     struct dhr d = {.n = p->n, .k = p->k, .v = 1 / (2 * p->sigma * p->sigma),
                     .cos_i = cos(theta_i_rad), .tan_i = tan(theta_i_rad),
                     .reach = REACH * p->sigma};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reads the tables of tests/golden (and of ../shared/real): '#' lines, a header row, numbers; what is
-// not a number becomes NAN. Included by one test program each; run from the repository's root.
+// Reads the tables of tests/golden (and of ../shared/real): '#' lines, a header row, numbers; what
+// is not a number becomes NAN. Included by one test program each; run from the repository's root.
 #pragma once
 #include <math.h>
 #include <stdbool.h>
@@ -53,7 +53,8 @@ static inline bool golden_open(struct golden *t, const char *path)
         for (int i = 0; i < t->columns; i++) {
             char *end = field[0];
             double v = i < fields ? strtod(field[i], &end) : 0;
-            t->value[row + (size_t)i] = i < fields && end != field[i] && *end == 0 ? v : (double)NAN;
+            t->value[row + (size_t)i] =
+                i < fields && end != field[i] && *end == 0 ? v : (double)NAN;
         }
     }
     fclose(in);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Readings for the tests of fit/: from a golden table, or made by the model with the paper's sampling.
+// Readings for the tests of fit/: from a golden table, or made by the model with the paper's
+// sampling.
 #pragma once
 #include "fit/fit.h"
 #include "fit/rng.h"
@@ -59,7 +60,8 @@ static inline double readings_model(const struct readings *r, const struct brdf_
     return brdf_f00(p, BRDF_DIFFUSE_PAPER, &g);
 }
 
-// The paper's ten sweeps, every 2.5 deg and 1 deg within 5 deg of specular, exact backscatter left out.
+// The paper's ten sweeps, every 2.5 deg and 1 deg within 5 deg of specular, exact backscatter left
+// out.
 static inline struct readings readings_paper(void)
 {
     static const double sweep[] = {0, 5, 10, 20, 30, 40, 45, 50, 55, 60};

@@ -49,8 +49,8 @@ static void check_rows(const char *name, bool in_plane)
         // The table's own rounding (17 digits of the sum) is all that is added to the tolerance.
         double tolerance = 1e-10 * fabs(specular) + 4e-16 * want;
         if (!(fabs(got - want) <= tolerance))
-            fail_msg("%s row %d (theta_i %g, theta_r %g, dphi %g): f00 %.17g, reference %.17g", name,
-                     i, ti, tr, dphi, got, want);
+            fail_msg("%s row %d (theta_i %g, theta_r %g, dphi %g): f00 %.17g, reference %.17g",
+                     name, i, ti, tr, dphi, got, want);
     }
     golden_close(&t);
 }
@@ -80,7 +80,8 @@ static void f00_shares_no_common_misreading_of_the_paper(void **state)
         const char *column, *name;
     } traps[] = {
         {"f00_eps_is_n_plus_ik", "eps = n + ik instead of (n + ik)^2 (erratum 1)"},
-        {"f00_eq5_exponent_no_2", "exp(-tan^2/sigma^2) instead of exp(-tan^2/(2 sigma^2)) (erratum 2)"},
+        {"f00_eq5_exponent_no_2",
+         "exp(-tan^2/sigma^2) instead of exp(-tan^2/(2 sigma^2)) (erratum 2)"},
         {"f00_no_masking", "G left out (erratum 14)"},
         {"f00_dphi_flipped_180", "dphi = 0 taken for the specular half plane (erratum 13)"},
     };
@@ -89,8 +90,8 @@ static void f00_shares_no_common_misreading_of_the_paper(void **state)
         struct brdf_params p = {golden_at(&t, i, "n"), golden_at(&t, i, "k"),
                                 golden_at(&t, i, "sigma"), 1, 0};
         double want = golden_at(&t, i, "f00_correct");
-        double got = f00_at_deg(&p, golden_at(&t, i, "theta_i_deg"), golden_at(&t, i, "theta_r_deg"),
-                                golden_at(&t, i, "dphi_deg"));
+        double got = f00_at_deg(&p, golden_at(&t, i, "theta_i_deg"),
+                                golden_at(&t, i, "theta_r_deg"), golden_at(&t, i, "dphi_deg"));
         if (fabs(got - want) <= 1e-10 * want)
             continue;
         for (size_t j = 0; j < sizeof traps / sizeof *traps; j++) {
@@ -132,8 +133,9 @@ static void peak_moves_off_specular_and_sticks_at_the_kink_of_g(void **state)
     (void)state;
     static const struct {
         double sigma, at_deg, f00;
-    } fact[] = {{.02, 45.091, 181.460264598}, {.05, 45.583, 29.1570008018}, {.1, 47.577, 7.41535821365},
-                {.15, 52.158, 3.42635838249}, {.2, 75, 2.29001614125},      {.25, 75, 2.02456978647},
+    } fact[] = {{.02, 45.091, 181.460264598}, {.05, 45.583, 29.1570008018},
+                {.1, 47.577, 7.41535821365},  {.15, 52.158, 3.42635838249},
+                {.2, 75, 2.29001614125},      {.25, 75, 2.02456978647},
                 {.3, 75, 1.67567711247}};
     for (size_t i = 0; i < sizeof fact / sizeof *fact; i++) {
         struct brdf_params p = {1.3, 7.5, fact[i].sigma, 1, 0};
@@ -167,7 +169,8 @@ static void diffuse_part_is_kd_over_cos_or_kd_over_pi(void **state)
 
 static double complex_fresnel(double n, double k, double s2, double c2)
 {
-    double complex eps = CMPLX(n, k) * CMPLX(n, k), q = csqrt(eps - s2);
+    double complex index = n + k * (double complex)_Complex_I;
+    double complex eps = index * index, q = csqrt(eps - s2);
     double c = sqrt(c2), rs = cabs((c - q) / (c + q)), rp = cabs((eps * c - q) / (eps * c + q));
     return (rs * rs + rp * rp) / 2;
 }
@@ -198,14 +201,24 @@ static void outside_the_domain_everything_is_nan(void **state)
 {
     (void)state;
     struct brdf_params good = {1.5, 0.1, 0.2, 1, 0.1};
-    static const double angles[][3] = {{-0.1, 0, 0}, {90, 0, 0}, {0, 90, 180}, {0, -1, 180},
-                                       {NAN, 0, 0},  {0, NAN, 0}, {0, 0, NAN}, {0, 0, INFINITY}};
+    static const double angles[][3] = {
+        {-0.1, 0, 0},        {90, 0, 0},          {0, 90, 180},        {0, -1, 180},
+        {(double)NAN, 0, 0}, {0, (double)NAN, 0}, {0, 0, (double)NAN}, {0, 0, (double)INFINITY}};
     for (size_t i = 0; i < sizeof angles / sizeof *angles; i++)
         assert_true(isnan(f00_at_deg(&good, angles[i][0], angles[i][1], angles[i][2])));
-    static const struct brdf_params bad[] = {
-        {0, 0, .1, 1, 0},  {-1, 0, .1, 1, 0}, {1.5, -1e-9, .1, 1, 0}, {1.5, 0, 0, 1, 0}, {1.5, 0, -.1, 1, 0},
-        {1.5, 0, .1, -1, 0}, {1.5, 0, .1, 1, -1}, {NAN, 0, .1, 1, 0},   {1.5, NAN, .1, 1, 0},
-        {1.5, 0, NAN, 1, 0}, {1.5, 0, .1, NAN, 0}, {1.5, 0, .1, 1, NAN}, {1.5, INFINITY, .1, 1, 0}};
+    static const struct brdf_params bad[] = {{0, 0, .1, 1, 0},
+                                             {-1, 0, .1, 1, 0},
+                                             {1.5, -1e-9, .1, 1, 0},
+                                             {1.5, 0, 0, 1, 0},
+                                             {1.5, 0, -.1, 1, 0},
+                                             {1.5, 0, .1, -1, 0},
+                                             {1.5, 0, .1, 1, -1},
+                                             {(double)NAN, 0, .1, 1, 0},
+                                             {1.5, (double)NAN, .1, 1, 0},
+                                             {1.5, 0, (double)NAN, 1, 0},
+                                             {1.5, 0, .1, (double)NAN, 0},
+                                             {1.5, 0, .1, 1, (double)NAN},
+                                             {1.5, (double)INFINITY, .1, 1, 0}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         assert_true(isnan(f00_at_deg(&bad[i], 30, 30, 180)));
         assert_true(isnan(brdf_dhr(&bad[i], BRDF_DIFFUSE_PAPER, 0)));

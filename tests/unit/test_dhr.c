@@ -33,14 +33,16 @@ static void dhr_equals_brute_force(void **state)
     static const struct {
         struct brdf_params p;
         double theta_i_deg;
-    } at[] = {{{1, 1e9, .3, 1, 0}, 45},       {{1, 1e9, .6, 1, 0}, 60},     {{1.5, 0, .1, 1, 0}, 60},
-              {{1.5, 0, .3, .9, .05}, 75},    {{1.3, 7.5, .12, 1, .01}, 45}, {{5.345, 5.345, .123451, .95, .0924}, 60},
-              {{.72, 0, .2, 1, 0}, 20},       {{.4, .1, .15, 1, 0}, 50}};
+    } at[] = {{{1, 1e9, .3, 1, 0}, 45},      {{1, 1e9, .6, 1, 0}, 60},
+              {{1.5, 0, .1, 1, 0}, 60},      {{1.5, 0, .3, .9, .05}, 75},
+              {{1.3, 7.5, .12, 1, .01}, 45}, {{5.345, 5.345, .123451, .95, .0924}, 60},
+              {{.72, 0, .2, 1, 0}, 20},      {{.4, .1, .15, 1, 0}, 50}};
     for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
         double ti = golden_rad(at[i].theta_i_deg);
         double got = brdf_dhr(&at[i].p, BRDF_DIFFUSE_PAPER, ti);
         // Midpoints twice, the h^2 error taken out (Richardson); the kinks leave some 1e-7.
-        double coarse = brute_force(&at[i].p, ti, 360, 180), fine = brute_force(&at[i].p, ti, 720, 360);
+        double coarse = brute_force(&at[i].p, ti, 360, 180),
+               fine = brute_force(&at[i].p, ti, 720, 360);
         double want = fine + (fine - coarse) / 3;
         if (fabs(got - want) > 1e-6)
             fail_msg("case %zu: %.9f, brute force %.9f", i, got, want);
@@ -51,9 +53,11 @@ static void perfect_mirror_reflects_all_when_smooth(void **state)
 {
     (void)state;
     // At theta_i = 0 shadowing begins at a slope of tan 30 deg; the rest is one-dimensional:
-    // integral 2 v rho exp(-v rho^2) min(1, 4/(1 + rho^2) - 2) d rho, by adaptive quadrature elsewhere.
-    static const double want[][2] = {{.01, 1},           {.05, 1},           {.1, 0.9999999975},
-                                     {.123451, 0.9999988312}, {.3, 0.9495532310}, {.6, 0.5638721105}};
+    // integral 2 v rho exp(-v rho^2) min(1, 4/(1 + rho^2) - 2) d rho, by adaptive quadrature
+    // elsewhere.
+    static const double want[][2] = {{.01, 1},           {.05, 1},
+                                     {.1, 0.9999999975}, {.123451, 0.9999988312},
+                                     {.3, 0.9495532310}, {.6, 0.5638721105}};
     for (size_t i = 0; i < sizeof want / sizeof *want; i++) {
         struct brdf_params p = mirror;
         p.sigma = want[i][0];

@@ -46,8 +46,8 @@ static void golden_optima_are_reached_from_every_seed(void **state)
             double delta = search(&r, &o, seed, &best);
             // 1e-4 is what is asked; what is found is the optimum to the digits of the table.
             if (fabs(delta / want - 1) > 1e-6)
-                fail_msg("%s g%d seed %d: Delta %.10g, best known %.10g", path, i % 2 ? 3 : 1, (int)seed,
-                         delta, want);
+                fail_msg("%s g%d seed %d: Delta %.10g, best known %.10g", path, i % 2 ? 3 : 1,
+                         (int)seed, delta, want);
         }
         readings_free(&r);
     }
@@ -67,8 +67,9 @@ static void same_seed_gives_the_same_bits(void **state)
     readings_free(&r);
 }
 
-// 60 random samples (seed 2026): no search may end above Delta at the truth, which is a feasible point, and
-// seeds must agree on the optimum. False alarms: none, both hold for every data set when the optimum is found.
+// 60 random samples (seed 2026): no search may end above Delta at the truth, which is a feasible
+// point, and seeds must agree on the optimum. False alarms: none, both hold for every data set when
+// the optimum is found.
 static void random_samples_agree_between_seeds(void **state)
 {
     (void)state;
@@ -90,8 +91,8 @@ static void random_samples_agree_between_seeds(void **state)
         for (int seed = 0; seed < 2; seed++)
             delta[seed] = search(&r, &o, (uint64_t)seed + 1, &best);
         if (delta[0] > truth || fabs(delta[0] / delta[1] - 1) > 1e-6)
-            fail_msg("sample %d (n %.3f k %.3f sigma %.3f): Delta %.9g and %.9g, truth %.9g", i, p.n, p.k,
-                     p.sigma, delta[0], delta[1], truth);
+            fail_msg("sample %d (n %.3f k %.3f sigma %.3f): Delta %.9g and %.9g, truth %.9g", i,
+                     p.n, p.k, p.sigma, delta[0], delta[1], truth);
     }
     readings_free(&r);
 }

@@ -19,8 +19,8 @@ static struct readings objective_readings(void)
     struct readings r = readings_new((size_t)t.rows);
     for (int i = 0; i < t.rows; i++)
         if (fabs(golden_at(&t, i, "n") - 5.345064) < 1e-9)
-            readings_add(&r, golden_at(&t, i, "theta_i_deg"), golden_at(&t, i, "theta_r_signed_deg"),
-                         golden_at(&t, i, "f00"));
+            readings_add(&r, golden_at(&t, i, "theta_i_deg"),
+                         golden_at(&t, i, "theta_r_signed_deg"), golden_at(&t, i, "f00"));
     golden_close(&t);
     assert_int_equal(r.count, 340);
     return r;
@@ -100,7 +100,9 @@ static void kernel_sums_are_those_of_the_model(void **state)
 {
     (void)state;
     struct readings all = objective_readings();
-    static const struct brdf_params p[] = {{1.5, 0, .15, .9, .05}, {1.3, 7.5, .02, 1, .01}, {.4, 0, .5, .7, .1},
+    static const struct brdf_params p[] = {{1.5, 0, .15, .9, .05},
+                                           {1.3, 7.5, .02, 1, .01},
+                                           {.4, 0, .5, .7, .1},
                                            {5.3, 5.3, .6, 1.2, 0}};
     for (size_t count = 5; count <= all.count; count = count < 20 ? count + 1 : count + 61)
         for (int j = 0; j < 4; j++) {
@@ -137,7 +139,8 @@ static void kernel_derivatives_are_those_of_the_model(void **state)
     struct fit_control control = {.stop = false};
     struct fit_set set;
     assert_int_equal(set_compile(&data, &o, &control, &set), 0);
-    static const struct brdf_params p[] = {{1.5, .1, .15, .9, .05}, {1.3, 7.5, .1, 1, .01}, {.8, .3, .3, .7, .1}};
+    static const struct brdf_params p[] = {
+        {1.5, .1, .15, .9, .05}, {1.3, 7.5, .1, 1, .01}, {.8, .3, .3, .7, .1}};
     for (int j = 0; j < 3; j++)
         for (size_t at = 0; at < set.padded; at += KERNEL_BLOCK) {
             struct kernel_block b;

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <cmocka.h>
 
-#define GENERATIONS 300 // of the paper's 1000: enough for what is asserted
+#define GENERATIONS 150 // of the paper's 1000: enough for what is asserted
 
 struct log {
     int calls;
@@ -110,7 +110,8 @@ static void crossover_and_mutation_rates_matter(void **state)
     struct readings r = dielectric();
     struct fit_options o = fit_options_default();
     struct log log;
-    // Without mutation and crossover only copies are left: the best of the first generation for ever.
+    // Without mutation and crossover only copies are left: the best of the first generation for
+    // ever.
     o.paper.pc = o.paper.pm = 0;
     o.paper.elitism = true;
     run(&r, &o, &log);
@@ -120,7 +121,8 @@ static void crossover_and_mutation_rates_matter(void **state)
     o.paper.pc = 1;
     run(&r, &o, &log);
     assert_true(log.best[GENERATIONS] < log.best[0]);
-    // With every bit flipped two generations are complements: mean Delta returns, nothing is learnt.
+    // With every bit flipped two generations are complements: mean Delta returns, nothing is
+    // learnt.
     o.paper.pc = 0;
     o.paper.pm = 1;
     o.paper.elitism = false;

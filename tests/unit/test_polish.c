@@ -11,7 +11,8 @@
 #include <stddef.h>
 #include <cmocka.h>
 
-static struct varpro solve(double aa, double ab, double bb, double af, double bf, const double box[4])
+static struct varpro solve(double aa, double ab, double bb, double af, double bf,
+                           const double box[4])
 {
     struct kernel_gram g = {.m = {{0}}};
     struct fit_space s = {{0}, {0}};
@@ -29,14 +30,16 @@ static struct varpro solve(double aa, double ab, double bb, double af, double bf
     return varpro_solve(&g, x, &s);
 }
 
-// Random convex quadratics (seed 11) over random boxes against a grid: nothing on the grid is lower.
+// Random convex quadratics (seed 11) over random boxes against a grid: nothing on the grid is
+// lower.
 static void box_solution_is_not_beaten_by_a_grid(void **state)
 {
     (void)state;
     struct rng rng;
     rng_seed(&rng, 11);
     for (int t = 0; t < 400; t++) {
-        double a1 = rng_normal(&rng), a2 = rng_normal(&rng), b1 = rng_normal(&rng), b2 = rng_normal(&rng);
+        double a1 = rng_normal(&rng), a2 = rng_normal(&rng), b1 = rng_normal(&rng),
+               b2 = rng_normal(&rng);
         if (t % 4 == 0) { // parallel columns
             b1 = 2 * a1;
             b2 = 2 * a2;
@@ -51,11 +54,12 @@ static void box_solution_is_not_beaten_by_a_grid(void **state)
         assert_true(v.ks >= box[0] && v.ks <= box[1] && v.kd >= box[2] && v.kd <= box[3]);
         for (int i = 0; i <= 40; i++)
             for (int j = 0; j <= 40; j++) {
-                double s = box[0] + (box[1] - box[0]) * i / 40, d = box[2] + (box[3] - box[2]) * j / 40;
+                double s = box[0] + (box[1] - box[0]) * i / 40,
+                       d = box[2] + (box[3] - box[2]) * j / 40;
                 double q = 100 + s * (aa * s + 2 * ab * d - 2 * af) + d * (bb * d - 2 * bf);
                 if (q < v.q - 1e-9)
-                    fail_msg("case %d: (%g, %g) gives %.12g, solution (%g, %g) %.12g", t, s, d, q, v.ks, v.kd,
-                             v.q);
+                    fail_msg("case %d: (%g, %g) gives %.12g, solution (%g, %g) %.12g", t, s, d, q,
+                             v.ks, v.kd, v.q);
             }
     }
 }
@@ -80,8 +84,9 @@ static double reduced_q(const struct fit_set *set, const struct fit_space *space
     return varpro_solve(&g, x, space).q;
 }
 
-// 40 samples, many with their optimum on bounds of k or ks: at what the polish returns no coordinate can be
-// moved to a lower q (steps of 1e-4 within the bounds), and polishing again gains nothing.
+// 40 samples, many with their optimum on bounds of k or ks: at what the polish returns no
+// coordinate can be moved to a lower q (steps of 1e-4 within the bounds), and polishing again gains
+// nothing.
 static void polish_ends_at_a_minimum_within_the_bounds(void **state)
 {
     (void)state;
@@ -91,8 +96,9 @@ static void polish_ends_at_a_minimum_within_the_bounds(void **state)
     int on_bound = 0;
     for (int t = 0; t < 40; t++) {
         double k = 2.8 * rng_uniform(&rng);
-        struct brdf_params p = {1.1 + 5 * rng_uniform(&rng), k * k, 0.03 * exp(2 * rng_uniform(&rng)),
-                                0.3 + 1.2 * rng_uniform(&rng), 0.1 * rng_uniform(&rng)};
+        struct brdf_params p = {1.1 + 5 * rng_uniform(&rng), k * k,
+                                0.03 * exp(2 * rng_uniform(&rng)), 0.3 + 1.2 * rng_uniform(&rng),
+                                0.1 * rng_uniform(&rng)};
         readings_measure(&r, &p, 0.02, 1e-5, rng_next(&rng));
         struct fit_options o = fit_options_default();
         o.weighting = FIT_RELATIVE;

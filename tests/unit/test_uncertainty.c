@@ -12,7 +12,8 @@
 
 #define SETS 50 // of noisy data, for each of two truths and two weightings
 
-static const struct brdf_params truth[2] = {{1.5, 0.02, 0.15, 0.9, 0.05}, {1.3, 7.5, 0.12, 1, 0.01}};
+static const struct brdf_params truth[2] = {{1.5, 0.02, 0.15, 0.9, 0.05},
+                                            {1.3, 7.5, 0.12, 1, 0.01}};
 
 static struct fit_result fit(const struct readings *r, const struct fit_options *o, bool with_u)
 {
@@ -25,7 +26,8 @@ static struct fit_result fit(const struct readings *r, const struct fit_options 
 static void eigenvalues_of_a_known_matrix(void **state)
 {
     (void)state;
-    double a[FIT_PARAMS][FIT_PARAMS] = {{2, 1}, {1, 2}, {0, 0, 1e-12}, {0, 0, 0, 5, 2}, {0, 0, 0, 2, 5}};
+    double a[FIT_PARAMS][FIT_PARAMS] = {
+        {2, 1}, {1, 2}, {0, 0, 1e-12}, {0, 0, 0, 5, 2}, {0, 0, 0, 2, 5}};
     double value[FIT_PARAMS], vector[FIT_PARAMS][FIT_PARAMS], found[5] = {0};
     static const double want[5] = {1, 3, 1e-12, 3, 7};
     eigen_symmetric(a, value, vector);
@@ -43,13 +45,16 @@ static void eigenvalues_of_a_known_matrix(void **state)
 
 static double estimates_of(const struct fit_result *f, int i)
 {
-    return i < FIT_PARAMS ? f->estimate[i].value : i == FIT_PARAMS ? f->ks_r0.value : f->ks_r45.value;
+    return i < FIT_PARAMS    ? f->estimate[i].value
+           : i == FIT_PARAMS ? f->ks_r0.value
+                             : f->ks_r45.value;
 }
 
-// Coverage of nominal 95 % intervals over 200 data sets (2 % noise, floor 1e-5, seeds printed): sigma and kd
-// by profile likelihood, ks R(0) and ks R(45) by 1.96 u. Each count is of 100 sets; with exact coverage
-// fewer than 86 has probability 1.2e-4, so that other seeds would raise a false alarm once in 1000 runs
-// (these seeds never do). The mean of (error/u)^2 is held too, against u that are too large.
+// Coverage of nominal 95 % intervals over 200 data sets (2 % noise, floor 1e-5, seeds printed):
+// sigma and kd by profile likelihood, ks R(0) and ks R(45) by 1.96 u. Each count is of 100 sets;
+// with exact coverage fewer than 86 has probability 1.2e-4, so that other seeds would raise a false
+// alarm once in 1000 runs (these seeds never do). The mean of (error/u)^2 is held too, against u
+// that are too large.
 static void intervals_cover_the_truth_as_often_as_they_say(void **state)
 {
     (void)state;
@@ -57,7 +62,8 @@ static void intervals_cover_the_truth_as_often_as_they_say(void **state)
     for (int weighted = 0; weighted < 2; weighted++) {
         int inside[4] = {0};
         double z2[4] = {0};
-        print_message("seeds 1000..%d, %s weights\n", 1000 + 2 * SETS - 1, weighted ? "1/u^2" : "uniform");
+        print_message("seeds 1000..%d, %s weights\n", 1000 + 2 * SETS - 1,
+                      weighted ? "1/u^2" : "uniform");
         for (int i = 0; i < 2 * SETS; i++) {
             const struct brdf_params *p = &truth[i % 2];
             struct fit_options o = fit_options_default();
@@ -75,8 +81,8 @@ static void intervals_cover_the_truth_as_often_as_they_say(void **state)
                 z2[j + 2] += pow((d[j]->value - want[j + 2]) / d[j]->u, 2) / (2 * SETS);
             }
         }
-        print_message("covered of %d: sigma %d, kd %d, ks R(0) %d, ks R(45) %d\n", 2 * SETS, inside[0], inside[1],
-                      inside[2], inside[3]);
+        print_message("covered of %d: sigma %d, kd %d, ks R(0) %d, ks R(45) %d\n", 2 * SETS,
+                      inside[0], inside[1], inside[2], inside[3]);
         for (int j = 0; j < 4; j++) {
             assert_true(inside[j] * 100 >= 86 * 2 * SETS);
             assert_true(z2[j] > 0.55 && z2[j] < 1.57); // 4 sigma of chi-squared/100
@@ -85,8 +91,9 @@ static void intervals_cover_the_truth_as_often_as_they_say(void **state)
     readings_free(&r);
 }
 
-// Over-weighting the specular peak: H^-1 alone would promise far too much (physics of weighted fits), the
-// sandwich's u must be the spread that repeated measurements have. 100 sets: 4 sigma is 28 %.
+// Over-weighting the specular peak: H^-1 alone would promise far too much (physics of weighted
+// fits), the sandwich's u must be the spread that repeated measurements have. 100 sets: 4 sigma is
+// 28 %.
 static void u_is_the_spread_of_repeated_fits_whatever_the_weights(void **state)
 {
     (void)state;
@@ -101,7 +108,10 @@ static void u_is_the_spread_of_repeated_fits_whatever_the_weights(void **state)
             double v = estimates_of(&f, j);
             sum[j] += v / sets;
             sum2[j] += v * v / sets;
-            u[j] += (j < FIT_PARAMS ? f.estimate[j].u : j == FIT_PARAMS ? f.ks_r0.u : f.ks_r45.u) / sets;
+            u[j] += (j < FIT_PARAMS    ? f.estimate[j].u
+                     : j == FIT_PARAMS ? f.ks_r0.u
+                                       : f.ks_r45.u) /
+                    sets;
         }
     }
     static const int identified[] = {FIT_SIGMA, FIT_KD, FIT_PARAMS, FIT_PARAMS + 1};
@@ -114,8 +124,8 @@ static void u_is_the_spread_of_repeated_fits_whatever_the_weights(void **state)
     readings_free(&r);
 }
 
-// The figures of weighted least squares with 1/u^2, 2 % noise and a 1e-5 floor: sigma .03 %, kd .12 % for
-// the metal and .16 %, .11 % for the dielectric (linear theory, 850 points).
+// The figures of weighted least squares with 1/u^2, 2 % noise and a 1e-5 floor: sigma .03 %, kd .12
+// % for the metal and .16 %, .11 % for the dielectric (linear theory, 850 points).
 static void u_is_that_of_linear_theory_for_variance_weights(void **state)
 {
     (void)state;
@@ -154,8 +164,10 @@ static void common_scale_goes_into_ks_kd_and_what_derives_from_them(void **state
     for (int i = FIT_KS; i <= FIT_KD; i++) {
         const struct fit_estimate *x = &a.estimate[i], *y = &b.estimate[i];
         assert_near(y->u / hypot(x->u, 0.03 * x->value), 1, 1e-12);
-        assert_near((y->value - y->lo95) / hypot(x->value - x->lo95, 1.96 * 0.03 * x->value), 1, 1e-4);
-        assert_near((y->hi95 - y->value) / hypot(x->hi95 - x->value, 1.96 * 0.03 * x->value), 1, 1e-4);
+        assert_near((y->value - y->lo95) / hypot(x->value - x->lo95, 1.96 * 0.03 * x->value), 1,
+                    1e-4);
+        assert_near((y->hi95 - y->value) / hypot(x->hi95 - x->value, 1.96 * 0.03 * x->value), 1,
+                    1e-4);
     }
     assert_near(b.ks_r0.u / hypot(a.ks_r0.u, 0.03 * a.ks_r0.value), 1, 1e-9);
     assert_near(b.ks_r45.u / hypot(a.ks_r45.u, 0.03 * a.ks_r45.value), 1, 1e-9);
@@ -182,7 +194,8 @@ static void all_is_finite(const struct fit_result *f)
         assert_true(isfinite(d[i]->value) && isfinite(d[i]->u) && d[i]->u >= 0);
 }
 
-// Bounds placed so that one, two or three parameters must lie on them, k at zero, ks at zero, fixed ones.
+// Bounds placed so that one, two or three parameters must lie on them, k at zero, ks at zero, fixed
+// ones.
 static void everything_is_finite_on_bounds_and_where_k_vanishes(void **state)
 {
     (void)state;
