@@ -8,6 +8,7 @@
 #include <math.h>
 
 #define SATURATED 0.95    // of full scale
+#define NEARLY_FULL 0.7   // of full scale: the next reading begins one range up
 #define HEADROOM 2.0      // of a range chosen for a known signal
 #define STEPS 30000.0     // a full scale has at least so many steps: what is below one is not known
 #define SAMPLE_TRIES 3    // for one answer that is not a number
@@ -165,6 +166,8 @@ static void judge(struct instrument *in, struct acquire *a, struct acquire_readi
         a->set_up = (r->flags & STORE_UNSETTLED) != 0; // somebody changed it, or it restarted
     } else {
         r->accepted = true;
+        if (r->range < top && signal_v > NEARLY_FULL * instrument_full_scale_v(in, r->range))
+            a->range = r->range + 1;
         if (r->range > a->least_range &&
             signal_v < ACQUIRE_UNDER * instrument_full_scale_v(in, r->range - 1))
             a->range = fitting_range(in, a, r);

@@ -465,6 +465,7 @@ static int light_up(struct engine *e)
         return rc;
     e->lit = true;
     e->dark = false;
+    e->light_ns = clk_now_ns(e->ports->clk);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     e->acquire.range = -1;
     say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g V", e->monitor_lit_v);
@@ -478,6 +479,7 @@ static int lights_out(struct engine *e)
         return rc;
     e->lit = false;
     e->dark = true;
+    e->light_ns = clk_now_ns(e->ports->clk);
     e->acquire.range = -1;
     return 0;
 }
@@ -512,10 +514,10 @@ static int prepare(struct engine *e)
 static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;
-    struct travel_pose pose = {{p->theta_i_deg, p->theta_r_deg, 0.0}};
+    struct travel_pose pose = {.at = {p->theta_i_deg, p->theta_r_deg, 0.0}};
     int rc = 0;
     if (p->kind == PLAN_DARK && !p->station[0])
-        pose = (struct travel_pose){{NAN, NAN, NAN}};
+        pose = (struct travel_pose){.at = {NAN, NAN, NAN}};
     else if (p->kind != PLAN_SAMPLE)
         rc = travel_station(e->in, p->station, &pose, &e->why);
     return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
@@ -602,7 +604,10 @@ static int do_point(struct engine *e)
         return rc;
     if (e->point->kind == PLAN_SAMPLE)
         enter(e, RUN_RUNNING, NULL);
-    e->light_ns = clk_now_ns(e->ports->clk);
+    if (e->point->kind == PLAN_BEAM) // the brightest there is
+        e->acquire.range = -1;
+    if (at.still_ns > e->light_ns)
+        e->light_ns = at.still_ns;
     return measure(e, &at);
 }
 

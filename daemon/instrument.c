@@ -27,6 +27,7 @@ struct motor {
     struct axis *axis;
     int bus; // index; -1: made from ready objects
     struct axis_place place;
+    int64_t seen_ns;  // when place was read; INT64_MIN: a command was sent since
     double commanded; // last target sent; NAN: none, or stopped since
     bool engaged;
 };
@@ -187,6 +188,7 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
         return rc;
     m->engaged = m->config->backlash <= 0;
     m->commanded = NAN;
+    m->seen_ns = INT64_MIN;
     return m->axis->ops->stop(m->axis, err);
 }
 
@@ -266,7 +268,7 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
         in->part[part] = (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         struct motor *m = &in->motor[part];
-        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]), .bus = -1, .commanded = NAN,
+        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]), .bus = -1, .commanded = NAN, .seen_ns = INT64_MIN,
                             .place = {.position = NAN, .target = NAN}};
         if (!m->config)
             in->part[part].link = PART_ABSENT;
@@ -480,7 +482,21 @@ int instrument_place(struct instrument *in, enum instrument_part part, struct ax
         .alarm_code = s.alarm_code,
         .alarm_text = s.alarm ? m->axis->ops->alarm_text(s.alarm_code) : "",
     };
+    m->seen_ns = instrument_now_ns(in);
     *ret_place = m->place;
+    return 0;
+}
+
+int instrument_place_recent(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
+                            struct gon_error *err)
+{
+    const struct motor *m = &in->motor[part];
+    const struct axis_place *p = &m->place;
+    const bool stands = !p->moving && p->in_position && p->ready && p->homed && !p->alarm;
+    if (!stands || m->seen_ns == INT64_MIN ||
+        instrument_now_ns(in) - m->seen_ns > CLK_MS(INSTRUMENT_FRESH_MS))
+        return instrument_place(in, part, ret_place, err);
+    *ret_place = *p;
     return 0;
 }
 
@@ -498,6 +514,7 @@ int instrument_go(struct instrument *in, enum instrument_part part, double posit
         return rc;
     const double rise = position - m->place.position;
     m->commanded = instrument_rounded(in, part, position);
+    m->seen_ns = INT64_MIN;
     if (c->backlash > 0)
         m->engaged = rise >= 0 && (m->engaged || rise >= c->backlash);
     rc = m->axis->ops->move_abs(m->axis, to_steps(c, position),
@@ -512,6 +529,7 @@ static int command(struct instrument *in, enum instrument_part part,
     struct motor *m = &in->motor[part];
     m->engaged = m->config->backlash <= 0;
     m->commanded = NAN;
+    m->seen_ns = INT64_MIN;
     return note(in, part, call(m->axis, err), err);
 }
 

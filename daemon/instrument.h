@@ -108,6 +108,8 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
 bool instrument_has(const struct instrument *in, enum instrument_part part);
 
 // --- axes, in user units; part < INSTRUMENT_AXES -------------------------------------------------
+#define INSTRUMENT_FRESH_MS 500.0
+
 struct axis_place {
     double position, target; // user units, from the encoder and of the last command
     bool moving, in_position, ready, homed, alarm;
@@ -118,6 +120,10 @@ struct axis_place {
 const struct bench_axis *instrument_axis(const struct instrument *in, enum instrument_part part);
 int instrument_place(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
                      struct gon_error *err);
+// The same from memory, when the axis was seen standing at its target at most INSTRUMENT_FRESH_MS ago and
+// told nothing since; otherwise asks. Each question costs some ms on a serial line.
+int instrument_place_recent(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
+                            struct gon_error *err);
 // Checks travel limits (GON_E_INPUT), then commands once. GON_E_LINK: it may have been carried out.
 int instrument_go(struct instrument *in, enum instrument_part part, double position, struct gon_error *err);
 int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err);

@@ -102,7 +102,7 @@ static int set_out(struct instrument *in, struct leg *t, const struct cancel *ca
 {
     const struct bench_axis *axis = instrument_axis(in, t->part);
     struct axis_place p;
-    int rc = instrument_place(in, t->part, &p, err);
+    int rc = instrument_place_recent(in, t->part, &p, err);
     if (rc >= 0)
         rc = check(in, t->part, &p, err);
     if (rc >= 0 && p.moving)
@@ -190,11 +190,11 @@ static int ride_all(struct instrument *in, struct leg *t, const struct cancel *c
 static int where(struct instrument *in, const struct travel_pose *target, struct travel_pose *ret_pose,
                  struct gon_error *err)
 {
-    struct travel_pose pose;
+    struct travel_pose pose = {.still_ns = instrument_now_ns(in)};
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         struct axis_place p = {.position = NAN};
         if (instrument_has(in, part)) {
-            int rc = instrument_place(in, part, &p, err);
+            int rc = instrument_place_recent(in, part, &p, err);
             if (rc >= 0)
                 rc = check(in, part, &p, err);
             if (rc < 0)
@@ -238,7 +238,7 @@ int travel_station(const struct instrument *in, const char *name, struct travel_
     const struct bench_station *s = bench_find_station(instrument_bench(in), name);
     if (!s)
         return gon_fail(err, GON_E_INPUT, "the bench has no station \"%s\": add it to stations", name);
-    *ret_pose = (struct travel_pose){{s->theta_i_deg, s->theta_r_deg, s->sample_mm}};
+    *ret_pose = (struct travel_pose){.at = {s->theta_i_deg, s->theta_r_deg, s->sample_mm}};
     return 0;
 }
 

@@ -16,9 +16,11 @@
 // User units, indexed by part. NAN: leave that axis where it is.
 struct travel_pose {
     double at[INSTRUMENT_AXES];
+    int64_t still_ns; // where it is: since when at the latest all of them stand
 };
 
 // Moves, waits, and returns where the encoders say that the axes are (NAN for an axis the bench has not).
+// Axes that need not move are asked at least each INSTRUMENT_FRESH_MS.
 int travel_move(struct instrument *in, const struct travel_pose *target, const struct cancel *cancel,
                 struct travel_pose *ret_actual, struct gon_error *err);
 // The pose of a station by its name; GON_E_INPUT when the bench has none of that name.

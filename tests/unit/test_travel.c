@@ -47,7 +47,7 @@ static double load(struct setting *s, enum world_axis axis)
 static int move(struct setting *s, double theta_i, double theta_r, double sample, struct travel_pose *ret,
                 struct gon_error *err)
 {
-    const struct travel_pose target = {{theta_i, theta_r, sample}};
+    const struct travel_pose target = {.at = {theta_i, theta_r, sample}};
     return travel_move(s->in, &target, s->cancel, ret, err);
 }
 
@@ -142,7 +142,7 @@ static void a_carried_out_move_with_a_lost_answer_is_sent_once(void **state)
     assert_int_equal(move(s, 0, 0, 0, &at, NULL), 0);
     const int moves = s->b.axis[PART_THETA_R].moves;
     s->b.fail_code = GON_E_LINK;
-    s->b.calls = 1;   // status, then the move is call 3: odd, so it is carried out
+    s->b.calls = 2;   // the move is call 3: odd, so it is carried out
     s->b.fail_at = 3;
     assert_int_equal(move(s, NAN, 35, NAN, &at, NULL), 0);
     assert_true(s->b.hit_done);
@@ -158,9 +158,9 @@ static void a_move_that_never_ends_is_reported_and_stopped(void **state)
     const int stops = s->b.axis[PART_THETA_I].stops;
     assert_int_equal(move(s, 0, 0, 0, &at, &err), 0);
     s->b.axis[PART_THETA_R].frozen = false;
-    const struct travel_pose target = {{40, 40, NAN}};
-    s->b.axis[PART_THETA_I].misses = 0;
+    const struct travel_pose target = {.at = {40, 40, NAN}};
     s->b.axis[PART_THETA_R].frozen = true;
+    clk_sleep(&s->b.clk.clk, CLK_S(1), NULL); // what was seen longer ago is asked again
     // frozen from the start: it is told to stop first and does not
     assert_int_equal(travel_move(s->in, &target, NULL, &at, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "axis theta_r: still moves 2 s after a stop"));
