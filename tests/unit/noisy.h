@@ -16,6 +16,7 @@ struct noisy {
     struct port *inner;
     uint64_t dice;
     unsigned one_in;       // answers per fault; 0: none
+    unsigned only;         // bits of noisy_fault; 0: all kinds
     int64_t late_most_ns;  // of a late answer, from when it was due
     int64_t double_most_ns;
     uint64_t faults;
@@ -40,7 +41,9 @@ static inline void noisy_garbage(struct noisy *n, int64_t due_ns)
 
 static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int64_t due_ns)
 {
-    const unsigned fault = n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
+    unsigned fault = n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
+    if (n->only && !(n->only >> fault & 1))
+        fault = NOISY_FAULTS;
     n->faults += fault < NOISY_FAULTS;
     switch (fault) {
     case NOISY_LOST: return;
