@@ -24,6 +24,7 @@ enum fit_method {
 enum fit_weighting {
     FIT_UNIFORM, // g = 1
     FIT_DENSE, // g = dense_g where |theta_r - theta_i| <= dense_half_width, edges included; else 1
+                 // (theta_r counts as negative on the backward half, cos dphi >= 0)
     FIT_RELATIVE, // g = 1/f^2; no reading may be zero
     FIT_VARIANCE  // g = 1/u^2
 };

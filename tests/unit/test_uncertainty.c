@@ -148,6 +148,31 @@ static void u_is_that_of_linear_theory_for_variance_weights(void **state)
     readings_free(&r);
 }
 
+// What k and ks become when n is held within n's own interval lies in theirs, in a valley so curved that
+// each one's own profile stops short of it.
+static void intervals_of_n_k_and_ks_agree_along_the_valley(void **state)
+{
+    (void)state;
+    struct readings r = readings_paper();
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        readings_measure(&r, &(struct brdf_params){2.5, 1, 0.08, 0.5, 0.02}, 0.02, 1e-5, seed);
+        struct fit_options o = fit_options_default();
+        struct fit_result f = fit(&r, &o, false);
+        for (int end = 0; end < 2; end++) {
+            const struct fit_estimate *e = &f.estimate[FIT_N];
+            o = fit_options_default();
+            o.lower.n = o.upper.n = 0.1 * e->value + 0.9 * (end ? e->hi95 : e->lo95);
+            struct fit_result held = fit(&r, &o, false);
+            for (int i = FIT_K; i <= FIT_KS; i += FIT_KS - FIT_K) {
+                double margin = 0.02 * (f.estimate[i].hi95 - f.estimate[i].lo95);
+                assert_true(held.estimate[i].value >= f.estimate[i].lo95 - margin);
+                assert_true(held.estimate[i].value <= f.estimate[i].hi95 + margin);
+            }
+        }
+    }
+    readings_free(&r);
+}
+
 static void common_scale_goes_into_ks_kd_and_what_derives_from_them(void **state)
 {
     (void)state;
@@ -247,6 +272,7 @@ int main(void)
         cmocka_unit_test(intervals_cover_the_truth_as_often_as_they_say),
         cmocka_unit_test(u_is_the_spread_of_repeated_fits_whatever_the_weights),
         cmocka_unit_test(u_is_that_of_linear_theory_for_variance_weights),
+        cmocka_unit_test(intervals_of_n_k_and_ks_agree_along_the_valley),
         cmocka_unit_test(common_scale_goes_into_ks_kd_and_what_derives_from_them),
         cmocka_unit_test(everything_is_finite_on_bounds_and_where_k_vanishes),
         cmocka_unit_test(without_noise_uncertainties_vanish),
