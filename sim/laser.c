@@ -67,7 +67,11 @@ static void flow(struct sim_laser *l, int64_t t_ns)
     } else {
         l->warmth *= exp(-dt_s / (4 * tau_s));
     }
-    noise_drift_step(&l->drift, &l->noise, dt_s);
+    l->drift_due_s += dt_s;
+    if (l->drift_due_s > l->drift.tau_s * 1e-5) { // jumps of 0.4 % of its rms
+        noise_drift_step(&l->drift, &l->noise, l->drift_due_s);
+        l->drift_due_s = 0;
+    }
     l->t_ns = t_ns;
 }
 

@@ -54,6 +54,7 @@ struct sim_laser {
     int64_t temperatures_due_ns;
     struct noise noise;
     struct noise_drift drift, rin;
+    double drift_due_s;      // the drift is too slow to be stepped each time
     bool ignores_off;        // fault injection: off is answered and nothing happens
     // what a test wants to know
     int64_t emission_since_ns; // when it last changed

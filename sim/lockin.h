@@ -30,6 +30,9 @@ struct lockin {
     // state
     double x[LOCKIN_POLES], y[LOCKIN_POLES];
     unsigned condition;         // sticky; whoever reads clears
+    double dt_s, keep, sd_v;    // of the last step: steps are often alike
+    double turn_x, turn_y;      // cosine and sine of turned_rad
+    double of_time_constant_s, turned_rad;
     struct noise noise;
 };
 

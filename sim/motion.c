@@ -69,6 +69,7 @@ double motion_left_s(const struct motion *m, int64_t t_ns)
 static double begin(struct motion *m, int64_t t_ns)
 {
     struct motion_state s = motion_at(m, t_ns);
+    m->plan++;
     m->start_ns = t_ns;
     m->motor0 = s.motor;
     m->load0 = s.load;

@@ -17,6 +17,7 @@ struct motion_leg {
 };
 
 struct motion {
+    uint64_t plan;   // its number: nothing changes at rest while it stays
     double min, max; // where the motor meets the hard limits
     double backlash; // >= 0
     // the plan

@@ -42,6 +42,10 @@ void noise_drift_step(struct noise_drift *d, struct noise *n, double dt_s)
 {
     if (d->rms <= 0 || d->tau_s <= 0 || dt_s <= 0)
         return;
-    double keep = exp(-dt_s / d->tau_s);
-    d->value = d->value * keep + d->rms * sqrt(1 - keep * keep) * noise_normal(n);
+    if (dt_s != d->dt_s) {
+        d->dt_s = dt_s;
+        d->keep = exp(-dt_s / d->tau_s);
+        d->add = sqrt(-expm1(-2 * dt_s / d->tau_s));
+    }
+    d->value = d->value * d->keep + d->rms * d->add * noise_normal(n);
 }

@@ -19,6 +19,7 @@ double noise_normal(struct noise *n);  // mean 0, variance 1 (Box and Muller)
 // A stationary, exponentially correlated process (Ornstein-Uhlenbeck), exact for any step.
 struct noise_drift {
     double value, rms, tau_s;
+    double dt_s, keep, add; // of the last step: steps are often alike
 };
 
 void noise_drift_step(struct noise_drift *d, struct noise *n, double dt_s);

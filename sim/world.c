@@ -56,16 +56,44 @@ void world_init(struct world *w, const struct world_spec *spec, int64_t t_ns)
     sim_laser_init(&w->laser, &spec->laser, spec->seed, t_ns);
     lockin_init(&w->lockin, spec->noise_v_per_rthz, spec->seed);
     noise_init(&w->monitor_noise, spec->seed, 300);
+    w->view.per_w = (double)NAN;
     world_settle(w);
 }
 
-double world_input_v(const struct world *w, int64_t t_ns)
+static bool seen(const struct world *w)
 {
-    struct optics_scene s = {.theta_i_deg = motion_at(&w->axis[WORLD_THETA_I], t_ns).load,
-                             .theta_r_deg = motion_at(&w->axis[WORLD_THETA_R], t_ns).load,
-                             .sample_mm = motion_at(&w->axis[WORLD_SAMPLE], t_ns).load,
-                             .power_w = sim_laser_power_w(&w->laser)};
-    double v = w->spec.responsivity_v_per_w * optics_detected_w(&w->spec.optics, &s) + w->spec.offset_v;
+    bool same = !isnan(w->view.per_w) && w->view.off == w->spec.optics.off;
+    for (int i = 0; i < WORLD_AXES; i++)
+        same = same && w->view.plan[i] == w->axis[i].plan && w->view.motor0[i] == w->axis[i].motor0;
+    return same;
+}
+
+// Optics is most of the work, and most of the time nothing moves.
+static double detected_per_w(struct world *w, int64_t t_ns)
+{
+    double at[WORLD_AXES];
+    bool rest = true;
+    if (seen(w))
+        return w->view.per_w;
+    for (int i = 0; i < WORLD_AXES; i++) {
+        struct motion_state s = motion_at(&w->axis[i], t_ns);
+        at[i] = s.load;
+        rest = rest && !s.moving && t_ns >= w->axis[i].start_ns;
+        w->view.plan[i] = w->axis[i].plan;
+        w->view.motor0[i] = w->axis[i].motor0;
+    }
+    struct optics_scene scene = {at[WORLD_THETA_I], at[WORLD_THETA_R], at[WORLD_SAMPLE], 1};
+    double per_w = optics_detected_w(&w->spec.optics, &scene);
+    w->view.off = w->spec.optics.off;
+    w->view.per_w = rest ? per_w : (double)NAN;
+    return per_w;
+}
+
+double world_input_v(struct world *w, int64_t t_ns)
+{
+    double power_w = sim_laser_power_w(&w->laser);
+    double detected_w = power_w > 0 ? power_w * detected_per_w(w, t_ns) : 0;
+    double v = w->spec.responsivity_v_per_w * detected_w + w->spec.offset_v;
     return w->saturate ? v + 10 : v;
 }
 

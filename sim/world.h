@@ -42,6 +42,12 @@ struct world {
     struct sim_laser laser;
     struct lockin lockin;
     struct noise monitor_noise;
+    struct world_view { // the detector's power per watt, while no axis moves
+        uint64_t plan[WORLD_AXES];
+        double motor0[WORLD_AXES];
+        unsigned off;
+        double per_w; // NAN: not known
+    } view;
     bool saturate; // fault injection: the input sees far too much
 };
 
@@ -50,7 +56,7 @@ extern const char *const world_axis_names[WORLD_AXES]; // "theta_i", "theta_r", 
 void world_defaults(struct world_spec *ret_spec); // a painted sample under 50 mW at 1.06 um
 void world_init(struct world *w, const struct world_spec *spec, int64_t t_ns);
 void world_see(struct world *w, int64_t t_ns);
-double world_input_v(const struct world *w, int64_t t_ns); // the lock-in's input without noise
+double world_input_v(struct world *w, int64_t t_ns); // the lock-in's input without noise
 double world_aux_v(struct world *w, int input);            // Aux In 1..4 now, with noise, steps of 1/3 mV
 // Rests after power-up or a jump: the filter has seen the present input for ever.
 void world_settle(struct world *w);

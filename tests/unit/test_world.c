@@ -478,6 +478,24 @@ static void looking_late_or_often_shows_the_same_light(void **state)
     near(a.lockin.x[1], b.lockin.x[1], 1e-12);
 }
 
+static void the_light_of_a_bench_at_rest_follows_every_change(void **state)
+{
+    (void)state;
+    struct world w = a_bright_world(3);
+    double bright = world_input_v(&w, S(11));
+    assert_true(bright > 1e-5 && world_input_v(&w, S(12)) == bright);
+    w.spec.optics.off = 1u << optics_term("scatter");
+    assert_true(world_input_v(&w, S(12)) == w.spec.offset_v);
+    w.spec.optics.off = 0;
+    assert_true(world_input_v(&w, S(12)) == bright);
+    motion_go(&w.axis[WORLD_THETA_R], -44, 20, 60, 60, S(13));
+    assert_true(world_input_v(&w, S(13.2)) != bright);
+    double after = world_input_v(&w, S(20));
+    assert_true(after != bright && world_input_v(&w, S(21)) == after);
+    motion_go(&w.axis[WORLD_THETA_R], -45, 20, 60, 60, S(22));
+    near(world_input_v(&w, S(30)), bright, 1e-9 * bright);
+}
+
 static void the_same_seed_is_the_same_world(void **state)
 {
     (void)state;
@@ -539,6 +557,7 @@ int main(void)
         cmocka_unit_test(the_phase_turns_x_into_y),
         cmocka_unit_test(the_beam_fits_the_largest_range_and_scatter_stands_out_of_the_noise),
         cmocka_unit_test(looking_late_or_often_shows_the_same_light),
+        cmocka_unit_test(the_light_of_a_bench_at_rest_follows_every_change),
         cmocka_unit_test(the_same_seed_is_the_same_world),
         cmocka_unit_test(the_monitor_follows_the_power_in_steps_of_a_third_of_a_millivolt),
         cmocka_unit_test(a_long_sleep_costs_no_more_than_sixty_time_constants),
