@@ -73,8 +73,9 @@ static json_t *correlation(const struct fit_result *r)
     return all;
 }
 
-static json_t *warnings(const struct fit_result *r)
+static json_t *warnings(const struct fit_record *f)
 {
+    const struct fit_result *r = &f->result;
     json_t *all = json_array();
     for (unsigned bit = 1; bit; bit <<= 1) {
         char text[400];
@@ -82,6 +83,8 @@ static json_t *warnings(const struct fit_result *r)
             fit_warning_text(r, (enum fit_warning)bit, text, sizeof text) > 0)
             json_array_append_new(all, json_string(text));
     }
+    if (f->note && *f->note)
+        json_array_append_new(all, json_string(f->note));
     return all;
 }
 
@@ -102,7 +105,7 @@ char *fit_json(const struct fit_record *f, int indent)
     json_object_set_new(o, "evaluations", json_integer(r->evaluations));
     json_object_set_new(o, "elapsed_ms", number(r->elapsed_ms));
     json_object_set_new(o, "elapsed_total_ms", number(r->elapsed_total_ms));
-    json_object_set_new(o, "warnings", warnings(r));
+    json_object_set_new(o, "warnings", warnings(f));
     char *text = o ? json_dumps(o, JSON_REAL_PRECISION(17) | JSON_INDENT((size_t)indent)) : NULL;
     json_decref(o);
     return text;

@@ -14,6 +14,7 @@
 //   variance of a sample = floor^2 + (rel S)^2,
 // is fitted to all accepted readings' sample variances by maximum likelihood (they follow a gamma
 // distribution with (count - 1)/2 degrees of shape). Likewise rel_monitor.
+// Fluctuations of the laser that the monitor divides out count in both: u_A is rather too large than too small.
 // u_B, common to all points as one factor: beam, 2u(r)/r, 2u(d)/d, linearity.
 // Thread: any.
 #pragma once
@@ -53,13 +54,18 @@ struct reduction {
     double u_beam_rel, u_radius_rel, u_distance_rel, u_linearity_rel;
     double u_scale_rel; // all of them
     int regime;         // enum bench_regime
-    int polarisation;   // of the laser, enum polarisation
+    int polarisation;   // of the light on the sample, enum polarisation
 };
+
+// What the numbers are not, in one sentence: with a polarised laser f_00 + m f_01. Returns the length that
+// snprintf would; 0: nothing to say.
+int reduction_warning(const struct reduction *r, char *text, size_t size);
 
 // Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark or no beam reading yet, or a beam that is
 // not above the dark.
 int reduce_run(const struct bench_config *bench, const struct plan *plan, const struct store_reading *rows,
                int count, struct reduction *ret_reduction, struct gon_error *err);
+// The same from a campaign file, with the bench and the polarisation that are kept in it.
 int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err);
 void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL is fine
 

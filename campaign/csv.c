@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: MIT
+#include "campaign/csv.h"
+
+#include "base/options.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <locale.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { MOST_COLUMNS = 500 };
+
+struct csv {
+    char *name, *text;
+    const char *next, *end;
+    long line; // of the row
+    struct csv_field *fields;
+    char **columns; // NULL-ended
+    int count;
+    locale_t c_locale;
+};
+
+// --- reading
+// -----------------------------------------------------------------------------------------
+
+static int slurp(int fd, const char *path, char **ret_text, size_t *ret_size, struct gon_error *err)
+{
+    size_t size = 0, room = 1 << 16;
+    char *text = malloc(room);
+    for (ssize_t n = 1; text && n > 0;) {
+        if (size == room) {
+            char *larger = realloc(text, room *= 2);
+            if (!larger)
+                free(text);
+            text = larger;
+            continue;
+        }
+        n = read(fd, text + size, room - size);
+        if (n < 0 && errno == EINTR)
+            n = 1;
+        else if (n < 0) {
+            free(text);
+            return gon_fail(err, GON_E_INPUT, "%s: %s", path, strerror(errno));
+        } else
+            size += (size_t)n;
+    }
+    if (!text)
+        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", path);
+    *ret_text = text;
+    *ret_size = size;
+    return GON_OK;
+}
+
+int csv_open(const char *path, struct csv **ret_csv, struct gon_error *err)
+{
+    char *text = NULL;
+    size_t size = 0;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return gon_fail(err, GON_E_INPUT, "%s: %s", path, strerror(errno));
+    int rc = slurp(fd, path, &text, &size, err);
+    close(fd);
+    if (rc < 0)
+        return rc;
+    rc = csv_parse(text, size, path, ret_csv, err);
+    free(text);
+    return rc;
+}
+
+// --- rows
+// --------------------------------------------------------------------------------------------
+
+static bool blank(char c)
+{
+    return c == ' ' || c == '\t';
+}
+
+static struct csv_field trimmed(const char *from, const char *to)
+{
+    while (from < to && blank(*from))
+        from++;
+    while (to > from && blank(to[-1]))
+        to--;
+    if (to - from >= 2 && *from == '"' && to[-1] == '"') {
+        from++;
+        to--;
+    }
+    return (struct csv_field){from, (size_t)(to - from)};
+}
+
+// The next line that is neither blank nor a comment, without its end; false at the end of the file.
+static bool next_line(struct csv *c, const char **ret_from, const char **ret_to)
+{
+    while (c->next < c->end) {
+        const char *from = c->next, *newline = memchr(from, '\n', (size_t)(c->end - from));
+        const char *to = newline ? newline : c->end;
+        c->next = newline ? newline + 1 : c->end;
+        c->line++;
+        if (to > from && to[-1] == '\r')
+            to--;
+        const struct csv_field all = trimmed(from, to);
+        if (all.size == 0 || *all.text == '#')
+            continue;
+        *ret_from = from;
+        *ret_to = to;
+        return true;
+    }
+    return false;
+}
+
+// Splits into at most most fields; returns how many there are.
+static int split(const char *from, const char *to, struct csv_field *fields, int most)
+{
+    for (int n = 0;; n++) {
+        const char *at = from;
+        while (at < to && blank(*at))
+            at++;
+        if (at < to && *at == '"') // a comma between quotes does not separate
+            for (at++; at < to && *at != '"'; at++)
+                ;
+        while (at < to && *at != ',')
+            at++;
+        if (n < most)
+            fields[n] = trimmed(from, at);
+        if (at >= to)
+            return n + 1;
+        from = at + 1;
+    }
+}
+
+static int header(struct csv *c, struct gon_error *err)
+{
+    const char *from, *to;
+    struct csv_field names[MOST_COLUMNS];
+    if (!next_line(c, &from, &to))
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: empty; the first line must name the columns",
+                        c->name, c->line + 1);
+    int n = split(from, to, names, MOST_COLUMNS);
+    if (n > MOST_COLUMNS)
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: %d columns; at most %d", c->name, c->line, n,
+                        MOST_COLUMNS);
+    if (n == 1 &&
+        (memchr(from, ';', (size_t)(to - from)) || memchr(from, '\t', (size_t)(to - from))))
+        return gon_fail(
+            err, GON_E_INPUT,
+            "%s:%ld: fields are separated by ';' or tabs; use commas, and decimal points in "
+            "numbers",
+            c->name, c->line);
+    c->columns = calloc((size_t)n + 1, sizeof *c->columns);
+    c->fields = calloc((size_t)n, sizeof *c->fields);
+    if (!c->columns || !c->fields)
+        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", c->name);
+    for (; c->count < n; c->count++)
+        if (!(c->columns[c->count] = strndup(names[c->count].text, names[c->count].size)))
+            return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", c->name);
+    return GON_OK;
+}
+
+int csv_parse(const char *text, size_t size, const char *name, struct csv **ret_csv,
+              struct gon_error *err)
+{
+    struct csv *c = calloc(1, sizeof *c);
+    int rc = GON_OK;
+    if (!c || !(c->name = strdup(name)) || !(c->text = malloc(size + 1)) ||
+        !(c->c_locale = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0))) {
+        csv_close(c);
+        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", name);
+    }
+    memcpy(c->text, text, size);
+    c->text[size] = 0;
+    c->next = c->text + (size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0);
+    c->end = c->text + size;
+    if (memchr(text, 0, size))
+        rc = gon_fail(err, GON_E_INPUT, "%s: not a text file (it contains a zero byte)", name);
+    if (rc >= 0)
+        rc = header(c, err);
+    if (rc < 0)
+        csv_close(c);
+    else
+        *ret_csv = c;
+    return rc;
+}
+
+void csv_close(struct csv *c)
+{
+    if (!c)
+        return;
+    for (int i = 0; i < c->count; i++)
+        free(c->columns[i]);
+    free(c->columns);
+    free(c->fields);
+    free(c->text);
+    free(c->name);
+    if (c->c_locale)
+        freelocale(c->c_locale);
+    free(c);
+}
+
+int csv_next(struct csv *c, struct gon_error *err)
+{
+    const char *from, *to;
+    if (!next_line(c, &from, &to))
+        return 0;
+    int n = split(from, to, c->fields, c->count);
+    if (n != c->count)
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: %d fields where the header names %d%s", c->name,
+                        c->line, n, c->count,
+                        n > c->count ? " (a decimal comma? numbers have a decimal point)" : "");
+    return 1;
+}
+
+long csv_line(const struct csv *c)
+{
+    return c->line;
+}
+
+// --- columns
+// -----------------------------------------------------------------------------------------
+
+int csv_column(const struct csv *c, const char *name)
+{
+    int found = -1;
+    for (int i = 0; i < c->count; i++)
+        if (!strcmp(c->columns[i], name))
+            found = found == -1 ? i : -2;
+    return found;
+}
+
+int csv_no_column(const struct csv *c, const char *name, struct gon_error *err)
+{
+    char all[300] = "";
+    if (csv_column(c, name) == -2)
+        return gon_fail(err, GON_E_INPUT, "%s:1: column '%s' is there twice", c->name, name);
+    const char *meant = options_suggest(name, (const char *const *)c->columns);
+    for (int i = 0; i < c->count; i++) {
+        size_t used = strlen(all);
+        snprintf(all + used, sizeof all - used, "%s%.40s", i ? ", " : "", c->columns[i]);
+    }
+    return meant
+               ? gon_fail(err, GON_E_INPUT, "%s: no column '%s'; did you mean '%.60s'?", c->name,
+                          name, meant)
+               : gon_fail(err, GON_E_INPUT, "%s: no column '%s'; there are %s", c->name, name, all);
+}
+
+// --- fields
+// ------------------------------------------------------------------------------------------
+
+struct csv_field csv_text(const struct csv *c, int column)
+{
+    return c->fields[column];
+}
+
+int csv_fail(const struct csv *c, int column, struct gon_error *err, const char *fmt, ...)
+{
+    char text[200];
+    const struct csv_field f = c->fields[column];
+    va_list args;
+    va_start(args, fmt);
+    vsnprintf(text, sizeof text, fmt, args);
+    va_end(args);
+    return gon_fail(err, GON_E_INPUT, "%s:%ld: %.60s = %.*s%s: %s", c->name, c->line,
+                    c->columns[column], f.size > 40 ? 40 : (int)f.size, f.text,
+                    f.size > 40 ? "..." : "", text);
+}
+
+static bool digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+struct decimal {
+    uint64_t digits; // up to 19 of them
+    int exponent;    // of ten
+    bool negative, exact, valid;
+};
+
+static const char *take_digits(const char *p, const char *end, struct decimal *d, int step,
+                               bool *any)
+{
+    for (; p < end && digit(*p); p++) {
+        *any = true;
+        if (d->digits < 1000000000000000000u) {
+            d->digits = d->digits * 10 + (uint64_t)(*p - '0');
+            d->exponent += step;
+        } else {
+            d->exact = false;
+        }
+    }
+    return p;
+}
+
+// [+-]digits[.digits][e[+-]digits] and nothing else: no hexadecimal, no "nan", no "inf".
+static struct decimal scan(struct csv_field f)
+{
+    struct decimal d = {.exact = true};
+    const char *p = f.text, *end = p + f.size;
+    bool any = false, exponent_any = false, negative = false;
+    if (p < end && (*p == '+' || *p == '-'))
+        d.negative = *p++ == '-';
+    p = take_digits(p, end, &d, 0, &any);
+    if (p < end && *p == '.')
+        p = take_digits(p + 1, end, &d, -1, &any);
+    if (p < end && any && (*p == 'e' || *p == 'E')) {
+        int e = 0;
+        if (++p < end && (*p == '+' || *p == '-'))
+            negative = *p++ == '-';
+        for (; p < end && digit(*p); p++, exponent_any = true)
+            e = e < 100000 ? e * 10 + (*p - '0') : e;
+        d.exponent += negative ? -e : e;
+        any = exponent_any;
+    }
+    d.valid = any && p == end;
+    return d;
+}
+
+// Digits below 2^53 and a power of ten up to 22 are exact, so that their product is rounded once,
+// as strtod would (Clinger, PLDI 1990); strtod does the others.
+static double value_of(const struct csv *c, struct csv_field f, const struct decimal *d)
+{
+    static const double powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                    1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                    1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    if (d->exact && d->digits <= (1ull << 53) && abs(d->exponent) <= 22) {
+        const double v = d->exponent < 0 ? (double)d->digits / powers[-d->exponent]
+                                         : (double)d->digits * powers[d->exponent];
+        return d->negative ? -v : v;
+    }
+    return strtod_l(f.text, NULL, c->c_locale); // ends at the comma, quote or line's end
+}
+
+int csv_real(const struct csv *c, int column, double *ret_value, struct gon_error *err)
+{
+    const struct csv_field f = c->fields[column];
+    const struct decimal d = scan(f);
+    if (f.size == 0)
+        return csv_fail(c, column, err, "an empty field; leave the row out or give a number");
+    if (!d.valid)
+        return csv_fail(c, column, err, "not a number");
+    const double value = value_of(c, f, &d);
+    if (!isfinite(value))
+        return csv_fail(c, column, err, "too large");
+    *ret_value = value;
+    return GON_OK;
+}

@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: MIT
+#include "campaign/reduce.h"
+
+#include "base/units.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NOISE_ROUNDS = 200 };
+
+// --- which readings count
+// ----------------------------------------------------------------------------
+
+static bool accepted(const struct store_reading *r)
+{
+    return !(r->flags & STORE_REJECTING);
+}
+
+// Walks plan and rows together; both are in the plan's order. Returns the last accepted reading of
+// the point, or NULL.
+static const struct store_reading *reading_of(const struct plan_point *p,
+                                              const struct store_reading *rows, int count, int *at)
+{
+    const struct store_reading *found = NULL;
+    for (; *at < count && rows[*at].sweep == p->sweep && rows[*at].point == p->point; (*at)++)
+        if (accepted(&rows[*at]))
+            found = &rows[*at];
+    return found;
+}
+
+// --- noise
+// -------------------------------------------------------------------------------------------
+
+struct variance { // of one reading's samples
+    double v2;    // square of the mean signal, over the largest
+    double s2;    // sample variance
+    double nu;    // degrees of freedom
+};
+
+// One step of Fisher scoring for s2 ~ a + b v2 with gamma errors: weighted least squares with the
+// weights nu / (a + b v2)^2, neither part below zero.
+static void score(const struct variance *list, int n, double least, double *a, double *b)
+{
+    double w0 = 0, w1 = 0, w2 = 0, y0 = 0, y1 = 0;
+    for (int i = 0; i < n; i++) {
+        const double mu = fmax(*a + *b * list[i].v2, least), w = list[i].nu / (mu * mu);
+        w0 += w;
+        w1 += w * list[i].v2;
+        w2 += w * list[i].v2 * list[i].v2;
+        y0 += w * list[i].s2;
+        y1 += w * list[i].v2 * list[i].s2;
+    }
+    const double det = w0 * w2 - w1 * w1;
+    double na = y0 / w0, nb = 0;
+    if (det > 1e-12 * w0 * w2) {
+        na = (w2 * y0 - w1 * y1) / det;
+        nb = (w0 * y1 - w1 * y0) / det;
+    }
+    if (na < 0) {
+        na = 0;
+        nb = y1 / w2;
+    } else if (nb < 0) {
+        na = y0 / w0;
+        nb = 0;
+    }
+    *a = na;
+    *b = nb;
+}
+
+static void fit_variances(const struct variance *list, int n, double *ret_a, double *ret_b)
+{
+    double mean = 0, nu = 0;
+    for (int i = 0; i < n; i++) {
+        mean += list[i].nu * list[i].s2;
+        nu += list[i].nu;
+    }
+    double a = mean / nu, b = 0;
+    const double least = 1e-12 * a;
+    for (int k = 0; k < NOISE_ROUNDS; k++) {
+        const double a0 = a, b0 = b;
+        score(list, n, least, &a, &b);
+        if (fabs(a - a0) <= 1e-9 * a && fabs(b - b0) <= 1e-9 * b)
+            break;
+    }
+    *ret_a = a;
+    *ret_b = b;
+}
+
+struct reduce_noise reduce_noise_of(const struct plan *plan, const struct store_reading *rows,
+                                    int count)
+{
+    struct reduce_noise noise = {(double)NAN, (double)NAN, 0};
+    struct variance *list = calloc((size_t)plan->count + 1, sizeof *list);
+    double largest = 0, scatter = 0, monitor = 0, monitor_nu = 0;
+    int n = 0;
+    for (int i = 0, at = 0; list && i < plan->count; i++) {
+        const struct store_reading *r = reading_of(&plan->points[i], rows, count, &at);
+        if (!r || r->count < 2)
+            continue;
+        list[n++] = (struct variance){r->signal_v * r->signal_v, r->signal_sd_v * r->signal_sd_v,
+                                      r->count - 1.0};
+        largest = fmax(largest, r->signal_v * r->signal_v);
+        scatter += r->signal_sd_v;
+        if (plan->points[i].kind != PLAN_DARK && isfinite(r->monitor_v) && r->monitor_v != 0) {
+            const double rel = r->monitor_sd_v / r->monitor_v;
+            monitor += (r->count - 1) * rel * rel;
+            monitor_nu += r->count - 1;
+        }
+    }
+    for (int i = 0; i < n && largest > 0; i++)
+        list[i].v2 /= largest;
+    if (scatter > 0) {
+        double a, b;
+        fit_variances(list, n, &a, &b);
+        noise.floor_v = sqrt(a);
+        noise.rel = largest > 0 ? sqrt(b / largest) : 0;
+    }
+    if (monitor_nu > 0)
+        noise.rel_monitor = sqrt(monitor / monitor_nu);
+    free(list);
+    return noise;
+}
+
+static double sample_u_v(const struct reduce_noise *n, double signal_v)
+{
+    return hypot(n->floor_v, n->rel * signal_v);
+}
+
+// --- references
+// --------------------------------------------------------------------------------------
+
+// Mean and standard uncertainty of the mean of a few values, from their scatter: 0 for a single
+// one.
+struct mean {
+    double sum, sum2;
+    int n;
+};
+
+static void mean_add(struct mean *m, double value)
+{
+    m->sum += value;
+    m->sum2 += value * value;
+    m->n++;
+}
+
+static double mean_of(const struct mean *m)
+{
+    return m->n ? m->sum / m->n : (double)NAN;
+}
+
+static double mean_u(const struct mean *m)
+{
+    if (m->n < 2)
+        return 0;
+    return sqrt(fmax(0, m->sum2 - m->sum * m->sum / m->n) / (m->n - 1) / m->n);
+}
+
+static double without_nan(double value)
+{
+    return isnan(value) ? 0 : value;
+}
+
+struct references {
+    struct mean dark_signal, dark_monitor, beam_signal, beam_monitor, beam_ratio;
+    int dark_samples, beam_samples;
+};
+
+static void add_darks(struct references *f, const struct plan *plan,
+                      const struct store_reading *rows, int count, int last_sweep)
+{
+    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
+        const struct store_reading *r = reading_of(&plan->points[i], rows, count, &at);
+        if (!r || plan->points[i].kind != PLAN_DARK)
+            continue;
+        mean_add(&f->dark_signal, r->signal_v);
+        mean_add(&f->dark_monitor, r->monitor_v);
+        f->dark_samples += r->count;
+    }
+}
+
+static void add_beams(struct references *f, const struct plan *plan,
+                      const struct store_reading *rows, int count, int last_sweep)
+{
+    const double dark_signal = mean_of(&f->dark_signal), dark_monitor = mean_of(&f->dark_monitor);
+    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
+        const struct store_reading *r = reading_of(&plan->points[i], rows, count, &at);
+        if (!r || plan->points[i].kind != PLAN_BEAM)
+            continue;
+        const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
+        mean_add(&f->beam_signal, r->signal_v);
+        mean_add(&f->beam_monitor, r->monitor_v);
+        mean_add(&f->beam_ratio, (r->signal_v - dark_signal) / monitor);
+        f->beam_samples += r->count;
+    }
+}
+
+static struct reduce_reference means(const struct references *f)
+{
+    return (struct reduce_reference){mean_of(&f->dark_signal), mean_of(&f->dark_monitor),
+                                     mean_of(&f->beam_signal), mean_of(&f->beam_monitor)};
+}
+
+struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
+                                       int count)
+{
+    struct references f = {0};
+    add_darks(&f, plan, rows, count, 0);
+    add_beams(&f, plan, rows, count, 0);
+    return means(&f);
+}
+
+// --- points
+// ------------------------------------------------------------------------------------------
+
+static double cosine(const struct reduction *r, const struct reduced_point *p)
+{
+    return cos(units_rad(r->regime == BENCH_OVERFILLED ? p->theta_i_deg : p->theta_r_deg));
+}
+
+// False when this point has no value: at or below the horizon, or with the light gone.
+static bool reduce_point(const struct reduction *r, const struct store_reading *row,
+                         double beam_ratio, struct reduced_point *p)
+{
+    const double monitor =
+        isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(r->reference.dark_monitor_v);
+    const double scale = 1 / (beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
+    if (!(cosine(r, p) > 1e-6) || !(monitor > 0))
+        return false;
+    p->f_per_sr = scale * (row->signal_v - r->reference.dark_signal_v) / monitor;
+    const double u_signal = sample_u_v(&r->noise, row->signal_v) / sqrt(row->count);
+    const double u_monitor = r->noise.rel_monitor / sqrt(row->count);
+    p->u_a_per_sr = hypot(scale * hypot(u_signal, r->u_dark_v) / monitor, p->f_per_sr * u_monitor);
+    p->u_b_per_sr = fabs(p->f_per_sr) * r->u_scale_rel;
+    return isfinite(p->f_per_sr);
+}
+
+static int reduce_points(struct reduction *r, const struct plan *plan,
+                         const struct store_reading *rows, int count, double beam_ratio,
+                         struct gon_error *err)
+{
+    r->points = calloc((size_t)plan->samples + 1, sizeof *r->points);
+    if (!r->points)
+        return gon_fail(err, GON_E_SYSTEM, "reduction: out of memory");
+    for (int i = 0, at = 0; i < plan->count; i++) {
+        const struct plan_point *point = &plan->points[i];
+        const struct store_reading *row = reading_of(point, rows, count, &at);
+        if (!row || point->kind != PLAN_SAMPLE)
+            continue;
+        struct reduced_point *p = &r->points[r->count];
+        *p = (struct reduced_point){.sweep = row->sweep,
+                                    .point = row->point,
+                                    .attempt = row->attempt,
+                                    .theta_i_deg = units_deg_of_udeg(row->theta_i_udeg),
+                                    .theta_r_deg = units_deg_of_udeg(row->theta_r_udeg),
+                                    .weight = point->weight};
+        if (reduce_point(r, row, beam_ratio, p))
+            r->count++;
+        else
+            r->left_out++;
+    }
+    return GON_OK;
+}
+
+// --- all of it
+// ---------------------------------------------------------------------------------------
+
+static int reduce_references(struct reduction *r, const struct references *f,
+                             double *ret_beam_ratio, struct gon_error *err)
+{
+    const double ratio = mean_of(&f->beam_ratio);
+    r->darks = f->dark_signal.n;
+    r->beams = f->beam_signal.n;
+    r->reference = means(f);
+    if (!r->darks || !r->beams)
+        return gon_fail(err, GON_E_INPUT, "no %s reading yet: without it there is no absolute BRDF",
+                        r->darks ? "beam" : "dark");
+    if (!(ratio > 0) || !isfinite(ratio))
+        return gon_fail(err, GON_E_INPUT,
+                        "the beam (%.4g V, monitor %.4g V) is not above the dark (%.4g V, monitor "
+                        "%.4g V); look at station 'beam', laser and monitor",
+                        r->reference.beam_signal_v, r->reference.beam_monitor_v,
+                        r->reference.dark_signal_v, r->reference.dark_monitor_v);
+    const double noise =
+        without_nan(sample_u_v(&r->noise, r->reference.beam_signal_v)) / r->reference.beam_signal_v;
+    r->u_dark_v =
+        hypot(mean_u(&f->dark_signal), without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
+    r->u_beam_rel = hypot(mean_u(&f->beam_ratio) / ratio,
+                          hypot(noise, r->noise.rel_monitor) / sqrt(f->beam_samples));
+    *ret_beam_ratio = ratio;
+    return GON_OK;
+}
+
+int reduce_run(const struct bench_config *bench, const struct plan *plan,
+               const struct store_reading *rows, int count, struct reduction *ret_reduction,
+               struct gon_error *err)
+{
+    struct reduction r = {.omega_sr = bench_omega_sr(bench),
+                          .regime = bench->regime,
+                          .polarisation = bench->laser.polarisation};
+    struct references f = {0};
+    double beam_ratio = 0;
+    add_darks(&f, plan, rows, count, plan->sweeps + 1);
+    add_beams(&f, plan, rows, count, plan->sweeps + 1);
+    r.noise = reduce_noise_of(plan, rows, count);
+    int rc = reduce_references(&r, &f, &beam_ratio, err);
+    if (rc < 0)
+        return rc;
+    r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
+    r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
+    r.u_linearity_rel = bench->detector.u_linearity_rel;
+    r.u_scale_rel =
+        hypot(hypot(r.u_beam_rel, r.u_radius_rel), hypot(r.u_distance_rel, r.u_linearity_rel));
+    rc = reduce_points(&r, plan, rows, count, beam_ratio, err);
+    if (rc >= 0)
+        *ret_reduction = r;
+    return rc;
+}
+
+int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err)
+{
+    struct bench_config bench;
+    struct plan plan = {0};
+    struct store_reading *rows = NULL;
+    int rc = store_read_bench(s, &bench, err);
+    if (rc >= 0)
+        rc = store_read_plan(s, &plan, err);
+    if (rc >= 0)
+        rc = store_read_readings(s, -1, &rows, err);
+    if (rc >= 0)
+        rc = reduce_run(&bench, &plan, rows, rc, ret_reduction, err);
+    if (rc >= 0) {
+        char *pol_in = store_read_meta(s, "pol_in");
+        int pol = pol_in ? polarisation_find(pol_in) : POL_UNKNOWN;
+        ret_reduction->polarisation = pol < 0 ? POL_UNKNOWN : pol;
+        free(pol_in);
+    }
+    plan_clear(&plan);
+    free(rows);
+    return rc;
+}
+
+void reduction_clear(struct reduction *r)
+{
+    if (!r)
+        return;
+    free(r->points);
+    *r = (struct reduction){0};
+}
+
+int reduction_warning(const struct reduction *r, char *text, size_t size)
+{
+    if (r->polarisation == POL_U)
+        return snprintf(text, size, "%s", "");
+    const char *name = polarisation_name((enum polarisation)r->polarisation);
+    return snprintf(
+        text, size,
+        "the laser's polarisation is %s%s: f_r is f_00 + m f_01, fitted as if it were f_00",
+        r->polarisation == POL_UNKNOWN ? "" : "not u but ", name);
+}
