@@ -40,6 +40,7 @@ struct exchange { // one request and its answer
     size_t size, swallowed;
     struct http_reply reply;
     struct stream *stream;
+    int watched_fd; // whose hang-up the loop reports; -1: none
 };
 
 struct http {
@@ -142,6 +143,21 @@ static int last_seen(struct exchange *x, uint64_t *ret_id)
     return GON_OK;
 }
 
+static int descriptor(struct MHD_Connection *c)
+{
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_CONNECTION_FD);
+    return info ? info->connect_fd : -1;
+}
+
+// The client went away, or will send no more: something to send tells which.
+static void stream_hung_up(void *ctx)
+{
+    struct exchange *x = ctx;
+    loop_remove(x->http->loop, x->watched_fd);
+    x->watched_fd = -1;
+    stream_ping(x->stream);
+}
+
 static enum MHD_Result send_stream(struct exchange *x)
 {
     uint64_t seen;
@@ -157,6 +173,9 @@ static enum MHD_Result send_stream(struct exchange *x)
     if (!r)
         return MHD_NO;
     x->http->streams++;
+    x->watched_fd = descriptor(x->connection);
+    if (loop_add_hangup(x->http->loop, x->watched_fd, stream_hung_up, x, NULL) < 0)
+        x->watched_fd = -1; // the next ping will notice
     x->stage = SENT;
     enum MHD_Result done = MHD_queue_response(x->connection, MHD_HTTP_OK, r);
     MHD_destroy_response(r);
@@ -196,11 +215,10 @@ static enum MHD_Result take_body(struct exchange *x, const char *data, size_t *s
 
 static void peer_of(struct MHD_Connection *c, struct http_request *ret_request)
 {
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_CONNECTION_FD);
     struct ucred who;
     socklen_t size = sizeof who;
     ret_request->pid = ret_request->uid = -1;
-    if (info && getsockopt(info->connect_fd, SOL_SOCKET, SO_PEERCRED, &who, &size) == 0) {
+    if (getsockopt(descriptor(c), SOL_SOCKET, SO_PEERCRED, &who, &size) == 0) {
         ret_request->pid = who.pid;
         ret_request->uid = (long)who.uid;
     }
@@ -224,7 +242,8 @@ static struct exchange *begin(struct http *h, struct MHD_Connection *c)
     struct exchange *x = calloc(1, sizeof *x);
     if (!x)
         return NULL;
-    *x = (struct exchange){.next = h->exchanges, .http = h, .connection = c, .ticket = ++h->next_ticket};
+    *x = (struct exchange){.next = h->exchanges, .http = h, .connection = c, .ticket = ++h->next_ticket,
+                            .watched_fd = -1};
     h->exchanges = x;
     return x;
 }
@@ -265,6 +284,8 @@ static void request_ended(void *cls, struct MHD_Connection *c, void **con_cls,
             *p = x->next;
             break;
         }
+    if (x->watched_fd >= 0)
+        loop_remove(h->loop, x->watched_fd);
     if (x->stream)
         h->streams--;
     stream_free(x->stream);

@@ -52,10 +52,10 @@ void loop_free(struct loop *loop)
     free(loop);
 }
 
-static struct source *add(struct loop *loop, int fd, void *ctx, struct gon_error *err)
+static struct source *add(struct loop *loop, int fd, uint32_t what, void *ctx, struct gon_error *err)
 {
     struct source *s = calloc(1, sizeof *s);
-    struct epoll_event e = {.events = EPOLLIN, .data.ptr = s};
+    struct epoll_event e = {.events = what, .data.ptr = s};
     if (!s || epoll_ctl(loop->epoll_fd, EPOLL_CTL_ADD, fd, &e) < 0) {
         free(s);
         gon_fail(err, GON_E_SYSTEM, "event loop: descriptor %d: %s", fd, strerror(errno));
@@ -68,13 +68,24 @@ static struct source *add(struct loop *loop, int fd, void *ctx, struct gon_error
     return s;
 }
 
-int loop_add(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, struct gon_error *err)
+static int add_ready(struct loop *loop, int fd, uint32_t what, void (*ready)(void *ctx), void *ctx,
+                     struct gon_error *err)
 {
-    struct source *s = add(loop, fd, ctx, err);
+    struct source *s = add(loop, fd, what, ctx, err);
     if (!s)
         return GON_E_SYSTEM;
     s->ready = ready;
     return GON_OK;
+}
+
+int loop_add(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, struct gon_error *err)
+{
+    return add_ready(loop, fd, EPOLLIN, ready, ctx, err);
+}
+
+int loop_add_hangup(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, struct gon_error *err)
+{
+    return add_ready(loop, fd, EPOLLRDHUP, ready, ctx, err);
 }
 
 // Freed between rounds only: an event of this round may still point at it.
@@ -106,7 +117,7 @@ int loop_every(struct loop *loop, int interval_ms, void (*ready)(void *ctx), voi
     struct timespec t = {interval_ms / 1000, interval_ms % 1000 * 1000000L};
     struct itimerspec every = {t, t};
     int fd = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK);
-    struct source *s = fd < 0 ? NULL : add(loop, fd, ctx, err);
+    struct source *s = fd < 0 ? NULL : add(loop, fd, EPOLLIN, ctx, err);
     if (!s || timerfd_settime(fd, 0, &every, NULL) < 0) {
         if (fd >= 0 && !s)
             close(fd);
@@ -126,7 +137,7 @@ int loop_signals(struct loop *loop, void (*ready)(void *ctx, int signal), void *
     sigaddset(&set, SIGTERM);
     sigaddset(&set, SIGHUP);
     int fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-    struct source *s = fd < 0 ? NULL : add(loop, fd, ctx, err);
+    struct source *s = fd < 0 ? NULL : add(loop, fd, EPOLLIN, ctx, err);
     if (!s) {
         if (fd >= 0)
             close(fd);

@@ -13,6 +13,8 @@ void loop_free(struct loop *loop); // closes timers and the signal descriptor, n
 
 // Calls ready(ctx) while fd is readable. The descriptor stays the caller's.
 int loop_add(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, struct gon_error *err);
+// Calls ready(ctx) while fd's peer has closed its end, and takes no notice of data.
+int loop_add_hangup(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, struct gon_error *err);
 void loop_remove(struct loop *loop, int fd);
 
 // Calls ready(ctx) every interval_ms, until loop_free.

@@ -32,7 +32,7 @@ struct runner {
     struct store_reading reading;
     bool pause, resume, halt, quit;
     struct note *start;     // the next run, held until the thread is idle
-    int64_t next_snapshot_ns;
+    int64_t next_snapshot_ns; // not before every part was asked once
 };
 
 // --- what the others say --------------------------------------------------------------------------
@@ -242,6 +242,7 @@ static void idle(struct runner *r)
         } else if (now_ns >= tend_ns) {
             instrument_tend(r->in);
             send_snapshot(r);
+            r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
             tend_ns = now_ns + CLK_MS(IDLE_MS);
         } else {
             struct note *n = note_wait(r->links.box, (int)((tend_ns - now_ns) / 1000000) + 1);
@@ -261,6 +262,7 @@ static void *thread_main(void *ctx)
         return NULL;
     }
     note_free(failed);
+    r->next_snapshot_ns = INT64_MAX;
     instrument_watch(r->in, watch, r);
     idle(r);
     note_free(r->start);
