@@ -215,7 +215,7 @@ static int take_row(const struct csv *c, const struct columns *k, struct row *r,
 static int take_rows(struct csv *c, const char *column, const struct dataset_filter *filter,
                      struct dataset *d, struct gon_error *err)
 {
-    struct columns k;
+    struct columns k = {-1, -1, -1, -1, -1, -1, -1, -1};
     size_t room = 0;
     int rc = find_columns(c, column, &k, err);
     while (rc >= 0 && (rc = csv_next(c, err)) == 1) {
