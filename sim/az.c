@@ -11,15 +11,30 @@
 
 enum { NUMBER, TYPE, POSITION, SPEED, START_RATE, STOP_RATE, CURRENT, TRIGGER, DESTINATION };
 enum { M_BITS = 0x000f, ZHOME = 1 << 4, STOP = 1 << 5, FREE = 1 << 6, ALM_RST = 1 << 7 };
-enum { HOME_END = 1 << 4, READY = 1 << 5, ALM_A = 1 << 7, SYS_BSY = 1 << 8, MOVE = 1 << 13, IN_POS = 1 << 14 };
-enum { DIRECT = 0x0058, PULSE = 0x0078, INPUT = 0x007c, RESET = 0x0180, PRESET = 0x018a, CONFIGURE = 0x018c };
+enum {
+    HOME_END = 1 << 4,
+    READY = 1 << 5,
+    ALM_A = 1 << 7,
+    SYS_BSY = 1 << 8,
+    MOVE = 1 << 13,
+    IN_POS = 1 << 14
+};
+enum {
+    DIRECT = 0x0058,
+    PULSE = 0x0078,
+    INPUT = 0x007c,
+    RESET = 0x0180,
+    PRESET = 0x018a,
+    CONFIGURE = 0x018c
+};
 
 static struct motion *motor(const struct sim_az *z)
 {
     return &z->world->axis[z->axis];
 }
 
-void sim_az_init(struct sim_az *z, struct world *world, enum world_axis axis, const struct sim_az_spec *spec)
+void sim_az_init(struct sim_az *z, struct world *world, enum world_axis axis,
+                 const struct sim_az_spec *spec)
 {
     assert(spec->steps_per_unit > 0 && spec->home_speed > 0 && spec->home_acceleration > 0);
     memset(z, 0, sizeof *z);
@@ -82,7 +97,8 @@ static void update(struct sim_az *z, int64_t t_ns)
     }
 }
 
-// --- motion -------------------------------------------------------------------------------------------
+// --- motion
+// -------------------------------------------------------------------------------------------
 
 static bool may_move(const struct sim_az *z)
 {
@@ -90,7 +106,8 @@ static bool may_move(const struct sim_az *z)
 }
 
 // The motor follows start_ns after the command; until then a motor at rest stays at rest.
-static void drive(struct sim_az *z, double target, double speed, double up, double down, int64_t t_ns)
+static void drive(struct sim_az *z, double target, double speed, double up, double down,
+                  int64_t t_ns)
 {
     world_see(z->world, t_ns);
     bool at_rest = !motion_at(motor(z), t_ns).moving;
@@ -160,7 +177,8 @@ static void input(struct sim_az *z, uint16_t value, int64_t t_ns)
         home(z, t_ns);
 }
 
-// --- reading ------------------------------------------------------------------------------------------
+// --- reading
+// ------------------------------------------------------------------------------------------
 
 static uint16_t status(const struct sim_az *z, int64_t t_ns)
 {
@@ -223,7 +241,8 @@ int sim_az_read(void *ctx, int address, int count, uint16_t *ret_registers, int6
     return 0;
 }
 
-// --- writing ------------------------------------------------------------------------------------------
+// --- writing
+// ------------------------------------------------------------------------------------------
 
 static int32_t pair(const uint16_t *r)
 {
@@ -293,9 +312,7 @@ static int write_value(struct sim_az *z, int address, uint16_t v, int64_t t_ns)
         input(z, z->input | v, t_ns);
         input(z, (uint16_t)(z->input & ~v), t_ns);
         return 0;
-    case INPUT:
-        input(z, v, t_ns);
-        return 0;
+    case INPUT: input(z, v, t_ns); return 0;
     case RESET:
         if (v > 1)
             return MODBUS_BAD_VALUE;
@@ -303,12 +320,9 @@ static int write_value(struct sim_az *z, int address, uint16_t v, int64_t t_ns)
             reset_alarm(z);
         z->last_reset = v;
         return 0;
-    case PRESET:
-        return write_stored(z, &z->last_preset, v, true, t_ns);
-    case CONFIGURE:
-        return write_stored(z, &z->last_configure, v, false, t_ns);
-    default:
-        return MODBUS_BAD_ADDRESS;
+    case PRESET: return write_stored(z, &z->last_preset, v, true, t_ns);
+    case CONFIGURE: return write_stored(z, &z->last_configure, v, false, t_ns);
+    default: return MODBUS_BAD_ADDRESS;
     }
 }
 

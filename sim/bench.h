@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The whole simulated bench: one world, its instruments, and two ports to each of them (a serial and a
-// TCP one). Still bytes and times only: goniosim puts wires on the ports, tests feed them. Thread: one.
+// The whole simulated bench: one world, its instruments, and two ports to each of them (a serial
+// and a TCP one). Still bytes and times only: goniosim puts wires on the ports, tests feed them.
+// Thread: one.
 #pragma once
 #include "sim/az.h"
 #include "sim/cobolt.h"

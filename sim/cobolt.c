@@ -11,7 +11,8 @@
 #define FIRMWARE "7.104"
 enum { REPLY = 80 };
 
-// --- actions: 0, or the reason of a refusal -----------------------------------------------------------
+// --- actions: 0, or the reason of a refusal
+// -----------------------------------------------------------
 
 static const char *start(struct sim_laser *l, bool autostart_sequence)
 {
@@ -81,16 +82,23 @@ static const struct {
     const char *command;
     const char *(*act)(struct sim_laser *l);
 } actions[] = {
-    {"l0", off},           {"l1", on},
-    {"@cob0", off},        {"@cob1", sequence},
-    {"restart", sequence}, {"abort", stop_sequence},
-    {"cf", clear},         {"cp", constant_power},
-    {"ecp", constant_power}, {"ci", constant_current},
-    {"ecc", constant_current}, {"@cobas 1", autostart_on},
+    {"l0", off},
+    {"l1", on},
+    {"@cob0", off},
+    {"@cob1", sequence},
+    {"restart", sequence},
+    {"abort", stop_sequence},
+    {"cf", clear},
+    {"cp", constant_power},
+    {"ecp", constant_power},
+    {"ci", constant_current},
+    {"ecc", constant_current},
+    {"@cobas 1", autostart_on},
     {"@cobas 0", autostart_off},
 };
 
-// --- queries and settings -----------------------------------------------------------------------------
+// --- queries and settings
+// -----------------------------------------------------------------------------
 
 // False: not a query that is known.
 static bool query(const struct sim_cobolt *c, const char *q, char ret_text[REPLY])
@@ -100,21 +108,26 @@ static bool query(const struct sim_cobolt *c, const char *q, char ret_text[REPLY
         const char *query;
         int value;
     } integers[] = {
-        {"gom?", l->state},         {"l?", sim_laser_emits(l)}, {"f?", l->fault},
-        {"ilk?", !l->interlock_closed}, {"@cobas?", l->autostart}, {"@cobasks?", l->key},
+        {"gom?", l->state},
+        {"l?", sim_laser_emits(l)},
+        {"f?", l->fault},
+        {"ilk?", !l->interlock_closed},
+        {"@cobas?", l->autostart},
+        {"@cobasks?", l->key},
         {"gam?", !l->constant_current},
     };
     const struct {
         const char *query, *format;
         double value;
     } reals[] = {
-        {"p?", "%.4f", l->setpoint_w},  {"pa?", "%.5f", sim_laser_power_w(l)},
+        {"p?", "%.4f", l->setpoint_w},          {"pa?", "%.5f", sim_laser_power_w(l)},
         {"gmlp?", "%.4f", l->spec.power_max_w}, {"i?", "%.1f", 1000 * sim_laser_current_a(l)},
-        {"glc?", "%.3f", l->current_a}, {"hrs?", "%.2f", c->hours},
+        {"glc?", "%.3f", l->current_a},         {"hrs?", "%.2f", c->hours},
     };
     const struct {
         const char *query, *text;
-    } texts[] = {{"?", "OK"}, {"sn?", SERIAL}, {"gsn?", SERIAL}, {"glm?", MODEL}, {"gfv?", FIRMWARE}};
+    } texts[] = {
+        {"?", "OK"}, {"sn?", SERIAL}, {"gsn?", SERIAL}, {"glm?", MODEL}, {"gfv?", FIRMWARE}};
     for (size_t i = 0; i < sizeof integers / sizeof integers[0]; i++)
         if (strcmp(q, integers[i].query) == 0)
             return snprintf(ret_text, REPLY, "%d", integers[i].value) > 0;
@@ -191,11 +204,13 @@ static void command(struct sim_cobolt_port *p, const char *line, int64_t t_ns)
     world_see(c->world, t_ns);
     char text[REPLY], out[SIM_LINE_MOST + REPLY + 8];
     carry_out(c, line, text);
-    int n = snprintf(out, sizeof out, "%s%s%s\r\n", c->echo ? line : "", c->echo ? "\r\n" : "", text);
+    int n =
+        snprintf(out, sizeof out, "%s%s%s\r\n", c->echo ? line : "", c->echo ? "\r\n" : "", text);
     port_send(&p->port, out, n < PORT_REPLY_MOST ? (size_t)n : PORT_REPLY_MOST, t_ns + c->reply_ns);
 }
 
-// --- the port -----------------------------------------------------------------------------------------
+// --- the port
+// -----------------------------------------------------------------------------------------
 
 static void feed(struct port *port, const uint8_t *bytes, size_t size, int64_t t_ns)
 {
@@ -220,7 +235,8 @@ static const struct port_ops ops = {feed, tick, hangup};
 
 void sim_cobolt_init(struct sim_cobolt *c, struct world *world, int64_t reply_ns)
 {
-    *c = (struct sim_cobolt){.world = world, .reply_ns = reply_ns, .last_ns = INT64_MIN, .hours = 1234.5};
+    *c = (struct sim_cobolt){
+        .world = world, .reply_ns = reply_ns, .last_ns = INT64_MIN, .hours = 1234.5};
 }
 
 void sim_cobolt_port_init(struct sim_cobolt_port *p, struct sim_cobolt *c)

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The text protocol of a Cobolt 05-01 laser (instruments.md 6 and 12): cmd CR, answer CR LF, in front of
-// the world's laser. Several ports may lead to the same laser. Thread: one.
+// The text protocol of a Cobolt 05-01 laser (instruments.md 6 and 12): cmd CR, answer CR LF, in
+// front of the world's laser. Several ports may lead to the same laser. Thread: one.
 //
-// A command that comes less than 100 ms after the one before is ignored, whole and without an answer;
-// empty lines and line feeds are nothing at all. Settings answer OK, what is not known "Syntax error:
-// illegal command", what is refused "Error: ..." (the real texts are not known). l1 is refused while
-// autostart is enabled, with the interlock open, without the key, with a fault; @cob1 waits for the key.
+// A command that comes less than 100 ms after the one before is ignored, whole and without an
+// answer; empty lines and line feeds are nothing at all. Settings answer OK, what is not known
+// "Syntax error: illegal command", what is refused "Error: ..." (the real texts are not known). l1
+// is refused while autostart is enabled, with the interlock open, without the key, with a fault;
+// @cob1 waits for the key.
 #pragma once
 #include "sim/line.h"
 #include "sim/port.h"
@@ -18,10 +19,10 @@
 
 struct sim_cobolt { // the laser's controller, shared by its ports
     struct world *world;
-    int64_t reply_ns;     // its time to answer
-    int64_t last_ns;      // when it took the last command
+    int64_t reply_ns; // its time to answer
+    int64_t last_ns;  // when it took the last command
     bool echo;
-    uint64_t too_early;   // commands ignored
+    uint64_t too_early; // commands ignored
     double hours;
 };
 

@@ -8,12 +8,24 @@
 
 // Offsets are all from the start of struct sim_config: groups lie at 0.
 #define AT(member) offsetof(struct sim_config, member)
-#define REAL(n, where, u, lo, hi, def, text) \
-    {.name = n, .type = CFG_REAL, .offset = AT(where), .unit = u, .min = lo, .max = hi, .fallback = def, .help = text}
-#define INT(n, where, u, lo, hi, def, text) \
-    {.name = n, .type = CFG_INT, .offset = AT(where), .unit = u, .min = lo, .max = hi, .fallback = def, .help = text}
-#define BOOL(n, where, def, text) {.name = n, .type = CFG_BOOL, .offset = AT(where), .fallback = def, .help = text}
-#define GROUP(n, table, text) {.name = n, .type = CFG_GROUP, .fallback = "", .help = text, .rows = table}
+#define REAL(n, where, u, lo, hi, def, text)                                                       \
+    {                                                                                              \
+        .name = n, .type = CFG_REAL, .offset = AT(where), .unit = u, .min = lo, .max = hi,         \
+        .fallback = def, .help = text                                                              \
+    }
+#define INT(n, where, u, lo, hi, def, text)                                                        \
+    {                                                                                              \
+        .name = n, .type = CFG_INT, .offset = AT(where), .unit = u, .min = lo, .max = hi,          \
+        .fallback = def, .help = text                                                              \
+    }
+#define BOOL(n, where, def, text)                                                                  \
+    {                                                                                              \
+        .name = n, .type = CFG_BOOL, .offset = AT(where), .fallback = def, .help = text            \
+    }
+#define GROUP(n, table, text)                                                                      \
+    {                                                                                              \
+        .name = n, .type = CFG_GROUP, .fallback = "", .help = text, .rows = table                  \
+    }
 
 static const char *const diffuse_names[] = {"paper", "lambert", NULL}; // enum brdf_diffuse
 
@@ -23,23 +35,34 @@ static const struct cfg_row sample_rows[] = {
     REAL("sigma", bench.world.optics.sample.sigma, NULL, 0.001, 1, "0.15", "rms slope per axis"),
     REAL("ks", bench.world.optics.sample.ks, NULL, 0, 2, "0.9", "specular strength"),
     REAL("kd", bench.world.optics.sample.kd, NULL, 0, 2, "0.05", "diffuse strength"),
-    {.name = "diffuse", .type = CFG_CHOICE, .offset = AT(bench.world.optics.diffuse), .fallback = "\"paper\"",
-     .help = "form of the diffuse term: kd/cos theta_i, or kd/pi", .choices = diffuse_names},
+    {.name = "diffuse",
+     .type = CFG_CHOICE,
+     .offset = AT(bench.world.optics.diffuse),
+     .fallback = "\"paper\"",
+     .help = "form of the diffuse term: kd/cos theta_i, or kd/pi",
+     .choices = diffuse_names},
     {0}};
 
 static const struct cfg_row optics_rows[] = {
-    REAL("aperture_radius_mm", bench.world.optics.aperture_radius_mm, "mm", 0.1, 50, "8", "of the detector"),
-    REAL("distance_mm", bench.world.optics.distance_mm, "mm", 50, 5000, "500", "from the sample to the aperture"),
-    REAL("divergence_deg", bench.world.optics.divergence_deg, "deg", 0.001, 0.5, "0.05", "half angle of the beam"),
-    REAL("transmission", bench.world.optics.transmission, NULL, 0, 1, "1", "of the straight-through path"),
+    REAL("aperture_radius_mm", bench.world.optics.aperture_radius_mm, "mm", 0.1, 50, "8",
+         "of the detector"),
+    REAL("distance_mm", bench.world.optics.distance_mm, "mm", 50, 5000, "500",
+         "from the sample to the aperture"),
+    REAL("divergence_deg", bench.world.optics.divergence_deg, "deg", 0.001, 0.5, "0.05",
+         "half angle of the beam"),
+    REAL("transmission", bench.world.optics.transmission, NULL, 0, 1, "1",
+         "of the straight-through path"),
     {0}};
 
 static const struct cfg_row axes_rows[] = {
     REAL("speed", speed, "deg/s", 0.01, 2000, "20", "written into the bench files for goniod"),
-    REAL("acceleration", acceleration, "deg/s2", 0.1, 1e6, "60", "written into the bench files for goniod"),
+    REAL("acceleration", acceleration, "deg/s2", 0.1, 1e6, "60",
+         "written into the bench files for goniod"),
     REAL("home_speed", bench.home_speed, "deg/s", 0.01, 2000, "10", "of the controllers' homing"),
-    REAL("home_acceleration", bench.home_acceleration, "deg/s2", 0.1, 1e6, "60", "of the controllers' homing"),
-    REAL("steps_per_unit", steps_per_unit, NULL, 1, 1e6, "1000", "steps of the motor per degree, or per mm"),
+    REAL("home_acceleration", bench.home_acceleration, "deg/s2", 0.1, 1e6, "60",
+         "of the controllers' homing"),
+    REAL("steps_per_unit", steps_per_unit, NULL, 1, 1e6, "1000",
+         "steps of the motor per degree, or per mm"),
     REAL("backlash", backlash, "deg", 0, 1, "0.015", "of theta_i and theta_r"),
     REAL("start_s", bench.start_s, "s", 0, 0.1, "0.002", "from a command to the motor"),
     BOOL("homed", bench.homed, "false", "home is known at power-up"),
@@ -48,27 +71,38 @@ static const struct cfg_row axes_rows[] = {
 
 static const struct cfg_row laser_rows[] = {
     REAL("power_w", power_w, "W", 0.001, 10, "0.05", "written into the bench files for goniod"),
-    REAL("power_max_w", bench.world.laser.power_max_w, "W", 0.001, 10, "0.1", "most that the laser accepts"),
-    REAL("temperatures_s", bench.world.laser.temperatures_s, "s", 0, 600, "20", "until its temperatures are right"),
-    REAL("warmup_s", bench.world.laser.warmup_s, "s", 0.01, 3600, "240", "from cold to within 0.03 % of its power"),
+    REAL("power_max_w", bench.world.laser.power_max_w, "W", 0.001, 10, "0.1",
+         "most that the laser accepts"),
+    REAL("temperatures_s", bench.world.laser.temperatures_s, "s", 0, 600, "20",
+         "until its temperatures are right"),
+    REAL("warmup_s", bench.world.laser.warmup_s, "s", 0.01, 3600, "240",
+         "from cold to within 0.03 % of its power"),
     REAL("drift_rms", bench.world.laser.drift_rms, NULL, 0, 0.5, "0.002", "relative slow drift"),
     REAL("drift_tau_s", bench.world.laser.drift_tau_s, "s", 1, 1e6, "1800", "its correlation time"),
     REAL("rin_rms", bench.world.laser.rin_rms, NULL, 0, 0.1, "0.0001", "relative intensity noise"),
     REAL("rin_tau_s", bench.world.laser.rin_tau_s, "s", 1e-6, 10, "0.005", "its correlation time"),
-    BOOL("key_after_off", bench.world.laser.key_after_off, "false", "the key must be cycled after each off"),
+    BOOL("key_after_off", bench.world.laser.key_after_off, "false",
+         "the key must be cycled after each off"),
     REAL("reply_s", bench.laser_reply_s, "s", 0, 1, "0.002", "its time to answer"),
     BOOL("echo", bench.laser_echo, "false", "it repeats each command before its answer"),
     {0}};
 
 static const struct cfg_row detector_rows[] = {
-    REAL("time_constant_s", time_constant_s, "s", 1e-5, 100, "0.1", "written into the bench files for goniod"),
-    INT("slope_db", slope_db, "dB", 6, 24, "12", "written into the bench files for goniod: 6, 12, 18, 24"),
-    REAL("responsivity_v_per_w", bench.world.responsivity_v_per_w, "V/W", 1e-3, 1e9, "16", "of the signal detector"),
+    REAL("time_constant_s", time_constant_s, "s", 1e-5, 100, "0.1",
+         "written into the bench files for goniod"),
+    INT("slope_db", slope_db, "dB", 6, 24, "12",
+        "written into the bench files for goniod: 6, 12, 18, 24"),
+    REAL("responsivity_v_per_w", bench.world.responsivity_v_per_w, "V/W", 1e-3, 1e9, "16",
+         "of the signal detector"),
     REAL("offset_v", bench.world.offset_v, "V", -0.1, 0.1, "2e-7", "dark signal"),
-    REAL("noise_v_per_rthz", bench.world.noise_v_per_rthz, "V/sqrt(Hz)", 0, 1e-3, "4e-9", "white input noise"),
-    REAL("monitor_v_per_w", bench.world.monitor_v_per_w, "V/W", 0, 1e6, "40", "of the monitor on Aux In 1"),
-    REAL("monitor_dark_v", bench.world.monitor_dark_v, "V", -1, 1, "0.002", "the monitor's dark signal"),
-    REAL("monitor_noise_v", bench.world.monitor_noise_v, "V", 0, 1, "0.0002", "rms of one monitor reading"),
+    REAL("noise_v_per_rthz", bench.world.noise_v_per_rthz, "V/sqrt(Hz)", 0, 1e-3, "4e-9",
+         "white input noise"),
+    REAL("monitor_v_per_w", bench.world.monitor_v_per_w, "V/W", 0, 1e6, "40",
+         "of the monitor on Aux In 1"),
+    REAL("monitor_dark_v", bench.world.monitor_dark_v, "V", -1, 1, "0.002",
+         "the monitor's dark signal"),
+    REAL("monitor_noise_v", bench.world.monitor_noise_v, "V", 0, 1, "0.0002",
+         "rms of one monitor reading"),
     REAL("reference_hz", bench.world.reference_hz, "Hz", 0.001, 102000, "1000", "of the chopper"),
     REAL("reply_s", bench.detector_reply_s, "s", 0, 1, "0.005", "its time to answer"),
     {0}};
@@ -90,7 +124,8 @@ const struct cfg_row sim_config_schema[] = {
     GROUP("wires", wires_rows, "how the wires behave"),
     {0}};
 
-// --- one setting --------------------------------------------------------------------------------------
+// --- one setting
+// --------------------------------------------------------------------------------------
 
 static int wrong(const char *path, const char *value, const char *allowed, struct gon_error *err)
 {
@@ -102,8 +137,8 @@ static int set_number(const struct cfg_row *row, const char *path, const char *v
 {
     double v;
     char allowed[80];
-    snprintf(allowed, sizeof allowed, "%s%g..%g%s%s", row->type == CFG_INT ? "whole numbers " : "", row->min,
-             row->max, row->unit ? " " : "", row->unit ? row->unit : "");
+    snprintf(allowed, sizeof allowed, "%s%g..%g%s%s", row->type == CFG_INT ? "whole numbers " : "",
+             row->min, row->max, row->unit ? " " : "", row->unit ? row->unit : "");
     if (options_real(value, &v) || !(v >= row->min && v <= row->max))
         return wrong(path, value, allowed, err);
     if (row->type == CFG_REAL)
@@ -160,7 +195,8 @@ static const struct cfg_row *find(const struct cfg_row *rows, const char *word, 
     return NULL;
 }
 
-static int unknown(const struct cfg_row *rows, const char *path, const char *word, struct gon_error *err)
+static int unknown(const struct cfg_row *rows, const char *path, const char *word,
+                   struct gon_error *err)
 {
     const char *names[40];
     int n = 0;
@@ -168,8 +204,9 @@ static int unknown(const struct cfg_row *rows, const char *path, const char *wor
         names[n++] = rows->name;
     names[n] = NULL;
     const char *meant = options_suggest(word, names);
-    return gon_fail(err, GON_E_INPUT, "unknown setting '%s'%s%s%s", path, meant ? "; did you mean '" : "",
-                    meant ? meant : "", meant ? "'?" : "; see configs/sim.cfg");
+    return gon_fail(err, GON_E_INPUT, "unknown setting '%s'%s%s%s", path,
+                    meant ? "; did you mean '" : "", meant ? meant : "",
+                    meant ? "'?" : "; see configs/sim.cfg");
 }
 
 #define SLOPES "6, 12, 18, 24 dB"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What can be set about the simulated bench: one table (base/cfg.h) for sim.cfg, for --set and for the
-// man page. Later wins: defaults, the file, --fast, --seed, --set. Thread: any.
+// What can be set about the simulated bench: one table (base/cfg.h) for sim.cfg, for --set and for
+// the man page. Later wins: defaults, the file, --fast, --seed, --set. Thread: any.
 #pragma once
 #include "base/cfg.h"
 #include "base/err.h"
@@ -13,7 +13,7 @@ struct sim_config {
     int seed;
     double steps_per_unit, backlash; // of all axes; of theta_i and theta_r
     // what the bench files for goniod say
-    double speed, acceleration;      // units/s, units/s2
+    double speed, acceleration; // units/s, units/s2
     double power_w;
     double time_constant_s;
     int slope_db;
@@ -29,6 +29,7 @@ int sim_config_defaults(struct sim_config *ret_config, struct gon_error *err);
 int sim_config_file(struct sim_config *c, const char *path, struct cfg_sink sink);
 void sim_config_fast(struct sim_config *c); // for demonstrations and tests
 // name is a path in the table ("laser.power_w"), value as in a file. GON_E_INPUT.
-int sim_config_set(struct sim_config *c, const char *name, const char *value, struct gon_error *err);
+int sim_config_set(struct sim_config *c, const char *name, const char *value,
+                   struct gon_error *err);
 // Puts what is said once into every place where it is used; last.
 void sim_config_finish(struct sim_config *c);

@@ -48,7 +48,8 @@ static struct sim_az *the_axis(struct request *r)
     return i < 0 ? NULL : &r->c->bench->az[i];
 }
 
-// --- what is asked ------------------------------------------------------------------------------------
+// --- what is asked
+// ------------------------------------------------------------------------------------
 
 static json_t *axes_state(const struct request *r)
 {
@@ -57,9 +58,10 @@ static json_t *axes_state(const struct request *r)
         const struct sim_az *z = &r->c->bench->az[i];
         struct motion_state s = motion_at(&r->c->bench->world.axis[i], r->t_ns);
         json_object_set_new(all, world_axis_names[i],
-                            json_pack("{s:f,s:f,s:f,s:b,s:b,s:i,s:i,s:I,s:I}", "motor", s.motor, "load", s.load,
-                                      "speed", s.speed, "moving", s.moving, "homed", z->homed, "alarm", z->alarm,
-                                      "steps", (int)sim_az_position_steps(z, r->t_ns), "moves",
+                            json_pack("{s:f,s:f,s:f,s:b,s:b,s:i,s:i,s:I,s:I}", "motor", s.motor,
+                                      "load", s.load, "speed", s.speed, "moving", s.moving, "homed",
+                                      z->homed, "alarm", z->alarm, "steps",
+                                      (int)sim_az_position_steps(z, r->t_ns), "moves",
                                       (json_int_t)z->moves, "ignored", (json_int_t)z->ignored));
     }
     return all;
@@ -73,20 +75,22 @@ static json_t *time_or_null(int64_t t_ns)
 static json_t *laser_state(const struct request *r)
 {
     const struct sim_laser *l = &r->c->bench->world.laser;
-    return json_pack("{s:b,s:I,s:f,s:f,s:i,s:i,s:b,s:b,s:b,s:o,s:o,s:I,s:I,s:I}", "emission", sim_laser_emits(l),
-                     "since_ns", (json_int_t)l->emission_since_ns, "power_w", sim_laser_power_w(l), "setpoint_w",
-                     l->setpoint_w, "state", l->state, "fault", l->fault, "key", l->key, "needs_key_cycle",
-                     l->needs_key_cycle, "interlock_closed", l->interlock_closed, "last_off_ns",
-                     time_or_null(l->last_off_ns), "last_on_ns", time_or_null(l->last_on_ns), "offs",
-                     (json_int_t)l->offs, "ons", (json_int_t)l->ons, "too_early",
+    return json_pack("{s:b,s:I,s:f,s:f,s:i,s:i,s:b,s:b,s:b,s:o,s:o,s:I,s:I,s:I}", "emission",
+                     sim_laser_emits(l), "since_ns", (json_int_t)l->emission_since_ns, "power_w",
+                     sim_laser_power_w(l), "setpoint_w", l->setpoint_w, "state", l->state, "fault",
+                     l->fault, "key", l->key, "needs_key_cycle", l->needs_key_cycle,
+                     "interlock_closed", l->interlock_closed, "last_off_ns",
+                     time_or_null(l->last_off_ns), "last_on_ns", time_or_null(l->last_on_ns),
+                     "offs", (json_int_t)l->offs, "ons", (json_int_t)l->ons, "too_early",
                      (json_int_t)r->c->bench->laser.too_early);
 }
 
 static json_t *detector_state(const struct request *r)
 {
     const struct lockin *l = &r->c->bench->world.lockin;
-    return json_pack("{s:f,s:f,s:i,s:f,s:i}", "input_v", world_input_v(&r->c->bench->world, r->t_ns),
-                     "time_constant_s", l->time_constant_s, "poles", l->poles, "full_scale_v", l->full_scale_v,
+    return json_pack("{s:f,s:f,s:i,s:f,s:i}", "input_v",
+                     world_input_v(&r->c->bench->world, r->t_ns), "time_constant_s",
+                     l->time_constant_s, "poles", l->poles, "full_scale_v", l->full_scale_v,
                      "condition", (int)l->condition);
 }
 
@@ -97,11 +101,12 @@ static json_t *wires_state(const struct request *r)
         const struct wire *w = &r->c->wires[i];
         json_object_set_new(
             all, w->name,
-            json_pack("{s:s,s:b,s:b,s:b,s:I,s:I,s:I,s:I,s:I,s:I}", "address", w->address, "plugged", w->plugged,
-                      "client", w->plugged && w->ops->client(w) >= 0, "mute", w->port->mute, "clients",
-                      (json_int_t)w->clients, "frames_in", (json_int_t)w->port->frames_in, "frames_out",
-                      (json_int_t)w->port->frames_out, "lost", (json_int_t)w->port->lost, "bytes_in",
-                      (json_int_t)w->bytes_in, "bytes_out", (json_int_t)w->bytes_out));
+            json_pack("{s:s,s:b,s:b,s:b,s:I,s:I,s:I,s:I,s:I,s:I}", "address", w->address, "plugged",
+                      w->plugged, "client", w->plugged && w->ops->client(w) >= 0, "mute",
+                      w->port->mute, "clients", (json_int_t)w->clients, "frames_in",
+                      (json_int_t)w->port->frames_in, "frames_out", (json_int_t)w->port->frames_out,
+                      "lost", (json_int_t)w->port->lost, "bytes_in", (json_int_t)w->bytes_in,
+                      "bytes_out", (json_int_t)w->bytes_out));
     }
     return all;
 }
@@ -122,20 +127,23 @@ static void do_truth(struct request *r)
     const struct optics_spec *o = &w->optics;
     json_object_set_new(r->out, "seed", json_integer((json_int_t)w->seed));
     json_object_set_new(r->out, "sample",
-                        json_pack("{s:f,s:f,s:f,s:f,s:f,s:s}", "n", o->sample.n, "k", o->sample.k, "sigma",
-                                  o->sample.sigma, "ks", o->sample.ks, "kd", o->sample.kd, "diffuse",
+                        json_pack("{s:f,s:f,s:f,s:f,s:f,s:s}", "n", o->sample.n, "k", o->sample.k,
+                                  "sigma", o->sample.sigma, "ks", o->sample.ks, "kd", o->sample.kd,
+                                  "diffuse",
                                   o->diffuse == BRDF_DIFFUSE_PAPER ? "paper" : "lambert"));
     json_object_set_new(r->out, "optics",
-                        json_pack("{s:f,s:f,s:f,s:f}", "aperture_radius_mm", o->aperture_radius_mm, "distance_mm",
-                                  o->distance_mm, "solid_angle_sr", optics_solid_angle_sr(o), "transmission",
-                                  o->transmission));
+                        json_pack("{s:f,s:f,s:f,s:f}", "aperture_radius_mm", o->aperture_radius_mm,
+                                  "distance_mm", o->distance_mm, "solid_angle_sr",
+                                  optics_solid_angle_sr(o), "transmission", o->transmission));
     json_object_set_new(r->out, "detector",
-                        json_pack("{s:f,s:f,s:f,s:f,s:f}", "responsivity_v_per_w", w->responsivity_v_per_w, "offset_v",
-                                  w->offset_v, "noise_v_per_rthz", w->noise_v_per_rthz, "monitor_v_per_w",
+                        json_pack("{s:f,s:f,s:f,s:f,s:f}", "responsivity_v_per_w",
+                                  w->responsivity_v_per_w, "offset_v", w->offset_v,
+                                  "noise_v_per_rthz", w->noise_v_per_rthz, "monitor_v_per_w",
                                   w->monitor_v_per_w, "monitor_dark_v", w->monitor_dark_v));
 }
 
-// --- what is done -------------------------------------------------------------------------------------
+// --- what is done
+// -------------------------------------------------------------------------------------
 
 static void do_plug(struct request *r)
 {
@@ -250,7 +258,8 @@ static void set_term(struct request *r, json_t *v)
     json_t *on = json_object_get(r->in, "on");
     unsigned *off = &r->c->bench->world.spec.optics.off;
     if (i < 0)
-        refuse(r, "'term' must be one of the optics' terms: %s, %s", optics_term_name(0), optics_term_name(1));
+        refuse(r, "'term' must be one of the optics' terms: %s, %s", optics_term_name(0),
+               optics_term_name(1));
     else if (truth(r, "on", on))
         *off &= ~(1u << i);
     else if (!*r->error)
@@ -262,10 +271,18 @@ static void do_set(struct request *r)
     static const struct {
         const char *key;
         void (*set)(struct request *r, json_t *v); // NULL: belongs to another key
-    } keys[] = {{"interlock", set_interlock}, {"key", set_key},         {"ignore_off", set_ignore_off},
-                {"saturate", set_saturate},   {"drop", set_drop},       {"delay_ms", set_delay},
-                {"alarm", set_alarm},         {"term", set_term},       {"do", NULL},
-                {"wire", NULL},               {"axis", NULL},           {"on", NULL}};
+    } keys[] = {{"interlock", set_interlock},
+                {"key", set_key},
+                {"ignore_off", set_ignore_off},
+                {"saturate", set_saturate},
+                {"drop", set_drop},
+                {"delay_ms", set_delay},
+                {"alarm", set_alarm},
+                {"term", set_term},
+                {"do", NULL},
+                {"wire", NULL},
+                {"axis", NULL},
+                {"on", NULL}};
     enum { KEYS = sizeof keys / sizeof keys[0] };
     const char *key;
     json_t *v;
@@ -282,14 +299,16 @@ static void do_set(struct request *r)
         done += keys[i].set != NULL;
     }
     if (done == 0)
-        refuse(r, "'set' needs something to set: interlock, key, ignore_off, saturate, drop, delay_ms, alarm, term");
+        refuse(r, "'set' needs something to set: interlock, key, ignore_off, saturate, drop, "
+                  "delay_ms, alarm, term");
     world_see(&r->c->bench->world, r->t_ns);
     for (int i = 0; i < KEYS && !*r->error; i++)
         if (keys[i].set && (v = json_object_get(r->in, keys[i].key)))
             keys[i].set(r, v);
 }
 
-// --- one line -----------------------------------------------------------------------------------------
+// --- one line
+// -----------------------------------------------------------------------------------------
 
 static const struct {
     const char *verb;
@@ -307,7 +326,9 @@ static void run(struct request *r)
             verbs[i].run(r);
             return;
         }
-    refuse(r, "'do' must be one of state, truth, plug, unplug, mute, unmute, set, power-cycle, not '%.40s'",
+    refuse(r,
+           "'do' must be one of state, truth, plug, unplug, mute, unmute, set, power-cycle, not "
+           "'%.40s'",
            verb ? verb : "");
 }
 

@@ -8,7 +8,8 @@
 #define THRESHOLD_A 0.4
 #define SLOPE_W_PER_A 0.2
 
-void sim_laser_init(struct sim_laser *l, const struct sim_laser_spec *spec, uint64_t seed, int64_t t_ns)
+void sim_laser_init(struct sim_laser *l, const struct sim_laser_spec *spec, uint64_t seed,
+                    int64_t t_ns)
 {
     memset(l, 0, sizeof *l);
     l->spec = *spec;
@@ -96,7 +97,8 @@ void sim_laser_step(struct sim_laser *l, int64_t t_ns)
         if (change_ns > t_ns)
             break;
         flow(l, change_ns);
-        enter(l, (enum sim_laser_state)(l->state + 1)); // the states are in the order of the sequence
+        enter(l,
+              (enum sim_laser_state)(l->state + 1)); // the states are in the order of the sequence
     }
     flow(l, t_ns);
 }
@@ -114,7 +116,7 @@ enum sim_laser_refusal sim_laser_start(struct sim_laser *l, bool autostart_seque
     if (!autostart_sequence && (!l->key || l->needs_key_cycle))
         return SIM_LASER_NO_KEY;
     if (l->state >= SIM_LASER_TEMPERATURES && l->state <= SIM_LASER_COMPLETED)
-        return SIM_LASER_ACCEPTED; // on its way, or there
+        return SIM_LASER_ACCEPTED;   // on its way, or there
     if (l->temperatures_due_ns == 0) // the TECs stay on from then on
         l->temperatures_due_ns = l->t_ns + (int64_t)(l->spec.temperatures_s * 1e9);
     if (l->temperatures_due_ns < l->t_ns)

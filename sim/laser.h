@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // The laser as a physical thing with its controller's state machine (instruments.md 6 and 12): key,
-// interlock, temperatures, warm-up, emission, and the power that comes out of it. Stepped by the time
-// passed in; no I/O. The protocol in front of it is sim/cobolt. Thread: one.
+// interlock, temperatures, warm-up, emission, and the power that comes out of it. Stepped by the
+// time passed in; no I/O. The protocol in front of it is sim/cobolt. Thread: one.
 //
-// off -> waiting for temperatures (TEC) -> waiting for the key -> warming up (light, rising) -> completed.
-// Opening the interlock while anything but off is on ends in fault 3 and asks for a key cycle. Warmth is
-// one number that goes exponentially to 1 while emitting and to 0, four times slower, while not; warm-up is over
-// when it lacks e^-8 = 3e-4, and takes warmup_s from cold.
+// off -> waiting for temperatures (TEC) -> waiting for the key -> warming up (light, rising) ->
+// completed. Opening the interlock while anything but off is on ends in fault 3 and asks for a key
+// cycle. Warmth is one number that goes exponentially to 1 while emitting and to 0, four times
+// slower, while not; warm-up is over when it lacks e^-8 = 3e-4, and takes warmup_s from cold.
 #pragma once
 #include "sim/noise.h"
 
@@ -33,36 +33,37 @@ enum sim_laser_refusal { // why emission was not switched on
 };
 
 struct sim_laser_spec {
-    double power_max_w;      // > 0
-    double power_w;          // set-point at power-up
-    double temperatures_s;   // until the TECs are at their set-points
-    double warmup_s;         // from cold, > 0
+    double power_max_w;            // > 0
+    double power_w;                // set-point at power-up
+    double temperatures_s;         // until the TECs are at their set-points
+    double warmup_s;               // from cold, > 0
     double drift_rms, drift_tau_s; // slow, relative
     double rin_rms, rin_tau_s;     // relative intensity noise: fast, relative
-    bool key_after_off;      // the key must be cycled after each off
+    bool key_after_off;            // the key must be cycled after each off
 };
 
 struct sim_laser {
     struct sim_laser_spec spec;
     int64_t t_ns;
     enum sim_laser_state state;
-    int fault;               // 0 none, 3 interlock
+    int fault; // 0 none, 3 interlock
     bool key, needs_key_cycle, interlock_closed, autostart;
-    bool constant_current;   // else constant power
+    bool constant_current; // else constant power
     double setpoint_w, current_a;
-    double warmth;           // 0..1
+    double warmth; // 0..1
     int64_t temperatures_due_ns;
     struct noise noise;
     struct noise_drift drift, rin;
-    double drift_due_s;      // the drift is too slow to be stepped each time
-    bool ignores_off;        // fault injection: off is answered and nothing happens
+    double drift_due_s; // the drift is too slow to be stepped each time
+    bool ignores_off;   // fault injection: off is answered and nothing happens
     // what a test wants to know
-    int64_t emission_since_ns; // when it last changed
+    int64_t emission_since_ns;       // when it last changed
     int64_t last_off_ns, last_on_ns; // commands; INT64_MIN: never
     uint64_t offs, ons;
 };
 
-void sim_laser_init(struct sim_laser *l, const struct sim_laser_spec *spec, uint64_t seed, int64_t t_ns);
+void sim_laser_init(struct sim_laser *l, const struct sim_laser_spec *spec, uint64_t seed,
+                    int64_t t_ns);
 void sim_laser_step(struct sim_laser *l, int64_t t_ns); // to t_ns; earlier times change nothing
 
 // Commands, at the time of the last step.
@@ -70,7 +71,7 @@ enum sim_laser_refusal sim_laser_start(struct sim_laser *l, bool autostart_seque
 void sim_laser_off(struct sim_laser *l);
 void sim_laser_abort(struct sim_laser *l);
 void sim_laser_clear_fault(struct sim_laser *l);
-void sim_laser_set_key(struct sim_laser *l, bool on);        // off and on again is a cycle
+void sim_laser_set_key(struct sim_laser *l, bool on); // off and on again is a cycle
 void sim_laser_set_interlock(struct sim_laser *l, bool closed);
 
 bool sim_laser_emits(const struct sim_laser *l);

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#define OVER 1.09       // of full scale, where the output overloads
+#define OVER 1.09 // of full scale, where the output overloads
 #define INPUT_MOST_V 1.4
 
 void lockin_init(struct lockin *l, double noise_v_per_rthz, uint64_t seed)
@@ -20,8 +20,8 @@ void lockin_init(struct lockin *l, double noise_v_per_rthz, uint64_t seed)
     noise_init(&l->noise, seed, 200);
 }
 
-// n equal poles with a constant input u: the deviations e_k = x_k - u follow e' = M e with M a Jordan
-// block of eigenvalue -1/T, whose exponential is written out here.
+// n equal poles with a constant input u: the deviations e_k = x_k - u follow e' = M e with M a
+// Jordan block of eigenvalue -1/T, whose exponential is written out here.
 static void filter(double *x, int poles, double u, double dt_over_t, double keep)
 {
     double e[LOCKIN_POLES];

@@ -22,12 +22,17 @@ struct arguments {
 };
 
 static const struct option_row rows[] = {
-    {"--run-dir", OPTION_TEXT, offsetof(struct arguments, run_dir), "DIR", 0, 0, "where wires and files appear; required"},
+    {"--run-dir", OPTION_TEXT, offsetof(struct arguments, run_dir), "DIR", 0, 0,
+     "where wires and files appear; required"},
     {"--config", OPTION_TEXT, offsetof(struct arguments, config), "FILE", 0, 0, "a sim.cfg"},
-    {"--set", OPTION_TEXT, offsetof(struct arguments, set), "NAME=VALUE", 0, 0, "one setting of sim.cfg; may be repeated"},
-    {"--seed", OPTION_INT, offsetof(struct arguments, seed), "N", 0, 2147483647, "of everything random"},
-    {"--fast", OPTION_FLAG, offsetof(struct arguments, fast), NULL, 0, 0, "quick axes, filter and warm-up; no baud timing"},
-    {"--exit-with-parent", OPTION_FLAG, offsetof(struct arguments, with_parent), NULL, 0, 0, "end when the parent process ends"},
+    {"--set", OPTION_TEXT, offsetof(struct arguments, set), "NAME=VALUE", 0, 0,
+     "one setting of sim.cfg; may be repeated"},
+    {"--seed", OPTION_INT, offsetof(struct arguments, seed), "N", 0, 2147483647,
+     "of everything random"},
+    {"--fast", OPTION_FLAG, offsetof(struct arguments, fast), NULL, 0, 0,
+     "quick axes, filter and warm-up; no baud timing"},
+    {"--exit-with-parent", OPTION_FLAG, offsetof(struct arguments, with_parent), NULL, 0, 0,
+     "end when the parent process ends"},
     {"--help", OPTION_FLAG, offsetof(struct arguments, help), NULL, 0, 0, "this text"},
     {"--version", OPTION_FLAG, offsetof(struct arguments, version), NULL, 0, 0, "name and version"},
     {0}};
@@ -57,7 +62,8 @@ static int take_sets(int argc, char **argv, struct arguments *a, struct gon_erro
             continue;
         }
         if (a->set_count == MOST_SETS || !strchr(value, '='))
-            return gon_fail(err, GON_E_INPUT, "--set %s: must be NAME=VALUE, at most %d times", value, MOST_SETS);
+            return gon_fail(err, GON_E_INPUT, "--set %s: must be NAME=VALUE, at most %d times",
+                            value, MOST_SETS);
         a->sets[a->set_count++] = value;
     }
     argv[kept] = NULL;
@@ -92,7 +98,8 @@ static int serve(struct arguments *a)
         rc = server_open(&config, a->run_dir, &server, &err);
     if (rc)
         return fail(&err);
-    printf("goniosim %s: %s, seed %d%s\nready\n", GONIO_VERSION, a->run_dir, config.seed, a->fast ? ", fast" : "");
+    printf("goniosim %s: %s, seed %d%s\nready\n", GONIO_VERSION, a->run_dir, config.seed,
+           a->fast ? ", fast" : "");
     if (fflush(stdout) == 0 || !a->with_parent) // else whoever waits for it is gone
         server_run(server, a->parent);
     server_close(server);
@@ -109,7 +116,8 @@ int main(int argc, char **argv)
     if (rc < 0)
         return fail(&err);
     if (a.help || a.version) {
-        printf(a.help ? "goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and a control socket\n"
+        printf(a.help ? "goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and "
+                        "a control socket\n"
                       : "goniosim " GONIO_VERSION "\n");
         if (a.help)
             options_describe(stdout, rows);

@@ -30,9 +30,11 @@ static void put_word(uint8_t *p, int value)
     p[1] = (uint8_t)value;
 }
 
-// --- requests and answers (PDU: function code and what follows) -------------------------------------
+// --- requests and answers (PDU: function code and what follows)
+// -------------------------------------
 
-// The length that the request's first bytes promise; 0: not enough of them yet, -1: no request we know.
+// The length that the request's first bytes promise; 0: not enough of them yet, -1: no request we
+// know.
 static int request_size(const uint8_t *pdu, size_t have)
 {
     if (have < 1)
@@ -51,8 +53,8 @@ struct answer {
     int size;
 };
 
-static int read_registers(const struct sim_modbus_unit *u, const uint8_t *where, int most, int64_t t_ns,
-                          struct answer *a)
+static int read_registers(const struct sim_modbus_unit *u, const uint8_t *where, int most,
+                          int64_t t_ns, struct answer *a)
 {
     int address = word(where), count = word(where + 2);
     if (count < 1 || count > most)
@@ -70,7 +72,8 @@ static int read_registers(const struct sim_modbus_unit *u, const uint8_t *where,
     return 0;
 }
 
-static int write_registers(const struct sim_modbus_unit *u, const uint8_t *where, int most, int64_t t_ns)
+static int write_registers(const struct sim_modbus_unit *u, const uint8_t *where, int most,
+                           int64_t t_ns)
 {
     int address = word(where), count = word(where + 2), bytes = where[4];
     if (count < 1 || count > most || bytes != 2 * count)
@@ -90,8 +93,7 @@ static int carry_out(const struct sim_modbus_unit *u, const uint8_t *pdu, int si
         return request_size(pdu, (size_t)size) < 0 ? MODBUS_BAD_FUNCTION : MODBUS_BAD_VALUE;
     int exception;
     switch (pdu[0]) {
-    case READ:
-        return read_registers(u, pdu + 1, 125, t_ns, a);
+    case READ: return read_registers(u, pdu + 1, 125, t_ns, a);
     case WRITE_ONE: {
         uint16_t value = (uint16_t)word(pdu + 3);
         memcpy(a->pdu, pdu, 5);
@@ -139,7 +141,8 @@ static bool answer(struct sim_modbus *m, int id, const uint8_t *pdu, int size, i
     return true;
 }
 
-// --- RTU ----------------------------------------------------------------------------------------------
+// --- RTU
+// ----------------------------------------------------------------------------------------------
 
 static void rtu_frame(struct sim_modbus *m, size_t size, int64_t t_ns)
 {
@@ -183,7 +186,8 @@ static void rtu_by_length(struct sim_modbus *m, int64_t t_ns)
     }
 }
 
-// --- TCP ----------------------------------------------------------------------------------------------
+// --- TCP
+// ----------------------------------------------------------------------------------------------
 
 static void tcp_frames(struct sim_modbus *m, int64_t t_ns)
 {
@@ -208,7 +212,8 @@ static void tcp_frames(struct sim_modbus *m, int64_t t_ns)
     }
 }
 
-// --- the port -----------------------------------------------------------------------------------------
+// --- the port
+// -----------------------------------------------------------------------------------------
 
 static void feed(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
 {

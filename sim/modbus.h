@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Modbus slaves behind a port: RTU frames (Modbus over Serial Line 1.02) or MBAP frames (Modbus
-// Messaging on TCP/IP 1.0b), functions 03, 06, 10h and 17h of the Application Protocol 1.1b3. Written
-// for the simulator, from those documents. Thread: one.
+// Messaging on TCP/IP 1.0b), functions 03, 06, 10h and 17h of the Application Protocol 1.1b3.
+// Written for the simulator, from those documents. Thread: one.
 //
-// RTU: a frame ends with gap_ns of silence (3.5 characters); a wrong CRC, an unknown unit or a size that
-// is no request is answered with silence. With gap_ns 0 (no baud timing) a frame ends as soon as its length is
-// complete, and half a frame is forgotten after 20 ms. Unit 0 is a broadcast: carried out, not answered.
-// TCP: a frame with a wrong protocol number is ignored; one that cannot be framed drops what came.
+// RTU: a frame ends with gap_ns of silence (3.5 characters); a wrong CRC, an unknown unit or a size
+// that is no request is answered with silence. With gap_ns 0 (no baud timing) a frame ends as soon
+// as its length is complete, and half a frame is forgotten after 20 ms. Unit 0 is a broadcast:
+// carried out, not answered. TCP: a frame with a wrong protocol number is ignored; one that cannot
+// be framed drops what came.
 #pragma once
 #include "sim/port.h"
 

@@ -13,7 +13,12 @@ void motion_init(struct motion *m, double min, double max, double backlash, doub
 {
     assert(min < max && backlash >= 0);
     at = clamp(at, min, max);
-    *m = (struct motion){.min = min, .max = max, .backlash = backlash, .motor0 = at, .load0 = at, .end = (double)NAN};
+    *m = (struct motion){.min = min,
+                         .max = max,
+                         .backlash = backlash,
+                         .motor0 = at,
+                         .load0 = at,
+                         .end = (double)NAN};
 }
 
 // The load is dragged: each leg is monotonic, so its end points say all.
@@ -85,9 +90,10 @@ static void add(struct motion *m, double duration_s, double speed0, double accel
         m->leg[m->legs++] = (struct motion_leg){duration_s, speed0, acceleration};
 }
 
-// Speed up from v0 (0 <= v0, in the direction of travel) to at most v, go on, slow down to rest after a
-// distance d that is long enough to stop within.
-static void trapezoid(struct motion *m, double sign, double d, double v0, double v, double a, double dec)
+// Speed up from v0 (0 <= v0, in the direction of travel) to at most v, go on, slow down to rest
+// after a distance d that is long enough to stop within.
+static void trapezoid(struct motion *m, double sign, double d, double v0, double v, double a,
+                      double dec)
 {
     double peak = sqrt((d + v0 * v0 / (2 * a)) / (1 / (2 * a) + 1 / (2 * dec)));
     if (peak > v)
@@ -99,8 +105,8 @@ static void trapezoid(struct motion *m, double sign, double d, double v0, double
     add(m, peak / dec, sign * peak, -sign * dec);
 }
 
-void motion_go(struct motion *m, double target, double speed, double acceleration, double deceleration,
-               int64_t t_ns)
+void motion_go(struct motion *m, double target, double speed, double acceleration,
+               double deceleration, int64_t t_ns)
 {
     assert(speed > 0 && acceleration > 0 && deceleration > 0);
     double v0 = begin(m, t_ns);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Randomness of the simulated bench: a counter through a mixing function (SplitMix64: Steele, Lea and
-// Flood, OOPSLA 2014), so that the same seed gives the same bench whatever else runs, and each source
-// has its own stream. Not for secrets. Thread: one per struct.
+// Randomness of the simulated bench: a counter through a mixing function (SplitMix64: Steele, Lea
+// and Flood, OOPSLA 2014), so that the same seed gives the same bench whatever else runs, and each
+// source has its own stream. Not for secrets. Thread: one per struct.
 #pragma once
 #include <stdint.h>
 

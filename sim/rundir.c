@@ -32,7 +32,8 @@ static int lock(struct rundir *r, struct gon_error *err)
         text[strcspn(text, "\n")] = 0;
         close(r->lock_fd);
         r->lock_fd = -1;
-        return gon_fail(err, GON_E_REFUSED, "%s is used by goniosim with process id %s; give another --run-dir",
+        return gon_fail(err, GON_E_REFUSED,
+                        "%s is used by goniosim with process id %s; give another --run-dir",
                         r->path, text);
     }
     if (ftruncate(r->lock_fd, 0) || dprintf(r->lock_fd, "%ld\n", (long)getpid()) < 0)
@@ -51,8 +52,8 @@ int rundir_open(struct rundir *r, const char *path, struct gon_error *err)
     if (!realpath(path, full))
         return gon_fail(err, GON_E_INPUT, "run directory %s: %s", path, strerror(errno));
     if (strlen(full) >= sizeof r->path)
-        return gon_fail(err, GON_E_INPUT, "run directory %s: its path has more than %zu characters", full,
-                        sizeof r->path - 1);
+        return gon_fail(err, GON_E_INPUT, "run directory %s: its path has more than %zu characters",
+                        full, sizeof r->path - 1);
     strcpy(r->path, full);
     r->dir_fd = open(full, O_PATH | O_DIRECTORY | O_CLOEXEC);
     return lock(r, err);
@@ -74,8 +75,8 @@ void rundir_close(struct rundir *r)
     r->lock_fd = -1;
 }
 
-int rundir_write(const struct rundir *r, const char *name, void (*write)(FILE *out, const void *ctx),
-                 const void *ctx, struct gon_error *err)
+int rundir_write(const struct rundir *r, const char *name,
+                 void (*write)(FILE *out, const void *ctx), const void *ctx, struct gon_error *err)
 {
     char path[RUNDIR_FILE], draft[RUNDIR_FILE + 8];
     rundir_path(r, name, path, sizeof path);

@@ -36,7 +36,8 @@ struct server {
     int signal_fd, listen_fd;
 };
 
-// --- opening ------------------------------------------------------------------------------------------
+// --- opening
+// ------------------------------------------------------------------------------------------
 
 static int open_wires(struct server *s, struct gon_error *err)
 {
@@ -64,7 +65,8 @@ static int open_control(struct server *s, struct gon_error *err)
     snprintf(a.sun_path, sizeof a.sun_path, "/proc/self/fd/%d/control.sock", s->dir.dir_fd);
     unlink(a.sun_path); // of one that was killed: this one has the lock
     s->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (s->listen_fd < 0 || bind(s->listen_fd, (struct sockaddr *)&a, sizeof a) || listen(s->listen_fd, CLIENTS))
+    if (s->listen_fd < 0 || bind(s->listen_fd, (struct sockaddr *)&a, sizeof a) ||
+        listen(s->listen_fd, CLIENTS))
         return gon_fail(err, GON_E_SYSTEM, "%s/control.sock: %s", s->dir.path, strerror(errno));
     return 0;
 }
@@ -86,8 +88,10 @@ static void write_serial(FILE *out, const void *ctx)
 {
     const struct server *s = ctx;
     char axes[700], laser[700], detector[700];
-    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", s->wire[BENCH_AXES].address, s->config.axes_baud);
-    snprintf(laser, sizeof laser, "serial:%s?baud=%d", s->wire[BENCH_LASER].address, s->config.laser_baud);
+    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", s->wire[BENCH_AXES].address,
+             s->config.axes_baud);
+    snprintf(laser, sizeof laser, "serial:%s?baud=%d", s->wire[BENCH_LASER].address,
+             s->config.laser_baud);
     snprintf(detector, sizeof detector, "serial:%s?baud=%d", s->wire[BENCH_DETECTOR].address,
              s->config.detector_baud);
     benchfile_write(out, &s->config, &(struct benchfile_links){axes, laser, detector});
@@ -158,7 +162,8 @@ void server_close(struct server *s)
     free(s);
 }
 
-// --- control clients ----------------------------------------------------------------------------------
+// --- control clients
+// ----------------------------------------------------------------------------------
 
 static void drop(struct client *c)
 {
@@ -209,7 +214,8 @@ static void welcome(struct server *s)
         close(fd);
 }
 
-// --- the loop -----------------------------------------------------------------------------------------
+// --- the loop
+// -----------------------------------------------------------------------------------------
 
 static struct timespec until(int64_t due_ns, int64_t now_ns)
 {
@@ -226,7 +232,8 @@ static int64_t next_ns(const struct server *s, int64_t most_ns)
     return most_ns;
 }
 
-static void serve_wires(struct server *s, struct pollfd wire_fds[BENCH_PORTS][WIRE_FDS], int64_t t_ns)
+static void serve_wires(struct server *s, struct pollfd wire_fds[BENCH_PORTS][WIRE_FDS],
+                        int64_t t_ns)
 {
     s->bench.axes_port[0].gap_ns = wire_char_ns(&s->wire[BENCH_AXES]) * 7 / 2; // 3.5 characters
     for (int i = 0; i < BENCH_PORTS; i++)
@@ -268,7 +275,8 @@ void server_run(struct server *s, pid_t parent)
 {
     prctl(PR_SET_TIMERSLACK, 1000UL);
     do {
-        int64_t most_ns = clk_now_ns(clk_system()) + (parent ? PARENT_NS : 3600 * INT64_C(1000000000));
+        int64_t most_ns =
+            clk_now_ns(clk_system()) + (parent ? PARENT_NS : 3600 * INT64_C(1000000000));
         if (!turn(s, most_ns))
             return;
     } while (!parent || getppid() == parent);

@@ -26,16 +26,26 @@ static const struct {
     double min, max, power_on;
     int decimals; // 0: an integer
 } settings[SIM_SR830_SETTINGS] = {
-    [SENS] = {"SENS", 0, 26, 26, 0},      [OFLT] = {"OFLT", 0, 19, 8, 0},
-    [OFSL] = {"OFSL", 0, 3, 1, 0},        [RMOD] = {"RMOD", 0, 2, 1, 0},
-    [PHAS] = {"PHAS", -360, 729.99, 0, 2}, [FREQ] = {"FREQ", 0.001, 102000, 1000, 2},
-    [OUTX] = {"OUTX", 0, 1, 1, 0},        {"SYNC", 0, 1, 0, 0},
-    {"ISRC", 0, 3, 0, 0},                 {"IGND", 0, 1, 0, 0},
-    {"ICPL", 0, 1, 0, 0},                 {"ILIN", 0, 3, 0, 0},
-    {"FMOD", 0, 1, 1, 0},                 {"RSLP", 0, 2, 0, 0},
-    {"HARM", 1, 19999, 1, 0},             {"SLVL", 0.004, 5, 1, 3},
-    {"LOCL", 0, 2, 0, 0},                 {"OVRM", 0, 1, 0, 0},
-    {"ALRM", 0, 1, 0, 0},                 {"KCLK", 0, 1, 1, 0},
+    [SENS] = {"SENS", 0, 26, 26, 0},
+    [OFLT] = {"OFLT", 0, 19, 8, 0},
+    [OFSL] = {"OFSL", 0, 3, 1, 0},
+    [RMOD] = {"RMOD", 0, 2, 1, 0},
+    [PHAS] = {"PHAS", -360, 729.99, 0, 2},
+    [FREQ] = {"FREQ", 0.001, 102000, 1000, 2},
+    [OUTX] = {"OUTX", 0, 1, 1, 0},
+    {"SYNC", 0, 1, 0, 0},
+    {"ISRC", 0, 3, 0, 0},
+    {"IGND", 0, 1, 0, 0},
+    {"ICPL", 0, 1, 0, 0},
+    {"ILIN", 0, 3, 0, 0},
+    {"FMOD", 0, 1, 1, 0},
+    {"RSLP", 0, 2, 0, 0},
+    {"HARM", 1, 19999, 1, 0},
+    {"SLVL", 0.004, 5, 1, 3},
+    {"LOCL", 0, 2, 0, 0},
+    {"OVRM", 0, 1, 0, 0},
+    {"ALRM", 0, 1, 0, 0},
+    {"KCLK", 0, 1, 1, 0},
 };
 
 static void apply(struct sim_sr830 *s)
@@ -58,7 +68,8 @@ static void reset(struct sim_sr830 *s)
     apply(s);
 }
 
-// --- one command --------------------------------------------------------------------------------------
+// --- one command
+// --------------------------------------------------------------------------------------
 
 struct request {
     struct sim_sr830 *s;
@@ -263,7 +274,8 @@ static bool run_setting(struct request *r, int i)
     return true;
 }
 
-// --- lines --------------------------------------------------------------------------------------------
+// --- lines
+// --------------------------------------------------------------------------------------------
 
 // "SNAP? 1,2,9,5": name of four letters, '?', parameters. False: not of that form.
 static bool parse(char *text, char name[5], struct request *r)

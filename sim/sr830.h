@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The RS-232 language of an SRS SR830 (instruments.md 1) in front of the world's lock-in. Several ports
-// may lead to the same instrument. Thread: one.
+// The RS-232 language of an SRS SR830 (instruments.md 1) in front of the world's lock-in. Several
+// ports may lead to the same instrument. Thread: one.
 //
-// Lines end with CR or LF, commands are joined by ';', each answer ends with its own CR. Answers go to
-// the interface that OUTX chose, which at power-up is GPIB (1): without OUTX 0 nothing is heard. A
-// command that is not known says nothing and sets *ESR bit 5, a bad parameter bit 4. Exponents have three
-// digits. Not modelled: data buffer, auto functions (AGAN, ARSV, APHS), display, macros: not known.
+// Lines end with CR or LF, commands are joined by ';', each answer ends with its own CR. Answers go
+// to the interface that OUTX chose, which at power-up is GPIB (1): without OUTX 0 nothing is heard.
+// A command that is not known says nothing and sets *ESR bit 5, a bad parameter bit 4. Exponents
+// have three digits. Not modelled: data buffer, auto functions (AGAN, ARSV, APHS), display, macros:
+// not known.
 #pragma once
 #include "sim/line.h"
 #include "sim/port.h"
@@ -17,10 +18,10 @@ enum { SIM_SR830_SETTINGS = 24, SIM_SR830_AUX = 4 };
 
 struct sim_sr830 {
     struct world *world;
-    int64_t reply_ns;      // its time to answer
+    int64_t reply_ns;                   // its time to answer
     double setting[SIM_SR830_SETTINGS]; // by the table in sr830.c
     double aux_out_v[SIM_SR830_AUX];
-    unsigned event;        // *ESR
+    unsigned event;                  // *ESR
     unsigned enable, request_enable; // *ESE, *SRE: kept
 };
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // A port on a real wire: a pty or a TCP listener on 127.0.0.1. The wire moves bytes and keeps their
-// times: with speed enforced, bytes arrive and leave no faster than the line's baud allows, measured on
-// absolute times. One client at a time; the next one on TCP is closed at once. Thread: the poll loop's.
+// times: with speed enforced, bytes arrive and leave no faster than the line's baud allows,
+// measured on absolute times. One client at a time; the next one on TCP is closed at once. Thread:
+// the poll loop's.
 //
-// The loop calls wire_poll_fds to fill its poll set, wire_next_ns for its timeout, and wire_serve after
-// each poll; nothing blocks.
+// The loop calls wire_poll_fds to fill its poll set, wire_next_ns for its timeout, and wire_serve
+// after each poll; nothing blocks.
 #pragma once
 #include "base/err.h"
 #include "sim/port.h"
@@ -22,9 +23,9 @@ struct wire_ops {
     int (*fds)(struct wire *w, struct pollfd fds[WIRE_FDS]); // how many
     // Takes care of comings and goings; true while a client may be read and written.
     bool (*attend)(struct wire *w, const struct pollfd *fds);
-    int (*client)(const struct wire *w);          // descriptor; -1: none
-    long (*baud)(const struct wire *w);           // of the client; 0: not a matter of this wire
-    void (*lost)(struct wire *w);                 // reading said that the client is gone
+    int (*client)(const struct wire *w); // descriptor; -1: none
+    long (*baud)(const struct wire *w);  // of the client; 0: not a matter of this wire
+    void (*lost)(struct wire *w);        // reading said that the client is gone
 };
 
 struct wire {
@@ -32,10 +33,10 @@ struct wire {
     const char *name;
     struct port *port;
     bool plugged;
-    bool enforce;           // baud timing
-    int bits;               // of a character on the line
+    bool enforce; // baud timing
+    int bits;     // of a character on the line
     uint64_t clients, bytes_in, bytes_out;
-    char address[600];      // pty: its symlink; TCP: "127.0.0.1:port"
+    char address[600]; // pty: its symlink; TCP: "127.0.0.1:port"
     // bytes on the line towards the instrument, and back
     uint8_t rx[WIRE_BUFFER], tx[WIRE_BUFFER];
     size_t rx_size, tx_size;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A serial line as a pty. While no client has the slave open the master reports POLLHUP without end, so
-// that it is not polled then; inotify on the slave says when somebody opens it. After the last close
-// the line goes back to a baud nobody asks for: the C library reports EINVAL for a tcsetattr that asks for
-// parity, which ptys cannot have, and changes nothing else. (A client that sets the same twice still
-// gets it; pymodbus does so when strict.)
+// A serial line as a pty. While no client has the slave open the master reports POLLHUP without
+// end, so that it is not polled then; inotify on the slave says when somebody opens it. After the
+// last close the line goes back to a baud nobody asks for: the C library reports EINVAL for a
+// tcsetattr that asks for parity, which ptys cannot have, and changes nothing else. (A client that
+// sets the same twice still gets it; pymodbus does so when strict.)
 #include "sim/wire.h"
 
 #include <errno.h>
@@ -60,7 +60,8 @@ static int pty_open(struct wire *w, struct gon_error *err)
     int master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     w->fd[MASTER] = master;
     w->vacant = true;
-    if (master < 0 || grantpt(master) || unlockpt(master) || ptsname_r(master, slave, sizeof slave)) {
+    if (master < 0 || grantpt(master) || unlockpt(master) ||
+        ptsname_r(master, slave, sizeof slave)) {
         int rc = gon_fail(err, GON_E_SYSTEM, "no pty: %s", strerror(errno));
         pty_close(w);
         return rc;
@@ -101,9 +102,10 @@ static bool somebody_opened(const struct wire *w)
     return any;
 }
 
-// Replies that nobody read stay with the slave and would meet the next client; a serial port forgets
-// them when it is closed, as it forgets TIOCEXCL. Only through the slave can that be done, and not even
-// there if somebody who is not root finds it claimed: then there is a new pty under the same name.
+// Replies that nobody read stay with the slave and would meet the next client; a serial port
+// forgets them when it is closed, as it forgets TIOCEXCL. Only through the slave can that be done,
+// and not even there if somebody who is not root finds it claimed: then there is a new pty under
+// the same name.
 static void forget(struct wire *w)
 {
     int slave = ioctl(w->fd[MASTER], TIOCGPTPEER, O_RDWR | O_NOCTTY | O_CLOEXEC);
@@ -164,7 +166,8 @@ static long pty_baud(const struct wire *w)
     return 9600;
 }
 
-static const struct wire_ops ops = {pty_open, pty_close, pty_fds, pty_attend, pty_client, pty_baud, leave};
+static const struct wire_ops ops = {pty_open,   pty_close, pty_fds, pty_attend,
+                                    pty_client, pty_baud,  leave};
 
 void wire_pty_init(struct wire *w, const char *name, struct port *port, const char *path)
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A wire as a TCP listener on 127.0.0.1, as serial servers and Modbus gateways give. Unplugging closes
-// the connection with a reset and the listener; plugging in listens on the same port again.
+// A wire as a TCP listener on 127.0.0.1, as serial servers and Modbus gateways give. Unplugging
+// closes the connection with a reset and the listener; plugging in listens on the same port again.
 #include "sim/wire.h"
 
 #include <arpa/inet.h>
@@ -43,8 +43,8 @@ static int tcp_open(struct wire *w, struct gon_error *err)
     if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) ||
         bind(fd, (struct sockaddr *)&a, sizeof a) || listen(fd, 4) ||
         getsockname(fd, (struct sockaddr *)&a, &size)) {
-        int rc = gon_fail(err, GON_E_SYSTEM, "cannot listen on 127.0.0.1 port %ld: %s", w->port_number,
-                          strerror(errno));
+        int rc = gon_fail(err, GON_E_SYSTEM, "cannot listen on 127.0.0.1 port %ld: %s",
+                          w->port_number, strerror(errno));
         tcp_close(w);
         return rc;
     }
@@ -110,7 +110,8 @@ static long tcp_baud(const struct wire *w)
     return 0;
 }
 
-static const struct wire_ops ops = {tcp_open, tcp_close, tcp_fds, tcp_attend, tcp_client, tcp_baud, tcp_lost};
+static const struct wire_ops ops = {tcp_open,   tcp_close, tcp_fds, tcp_attend,
+                                    tcp_client, tcp_baud,  tcp_lost};
 
 void wire_tcp_init(struct wire *w, const char *name, struct port *port)
 {

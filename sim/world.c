@@ -9,8 +9,8 @@
 
 const char *const world_axis_names[WORLD_AXES] = {"theta_i", "theta_r", "sample"};
 
-// A beam of 50 mW is 0.8 V, below the 1 V range; f = 0.05/sr at theta_r = 45 deg is 23 uV, 500 times
-// the noise of 4 nV/rtHz through 12 dB per octave at 1 ms (45 nV).
+// A beam of 50 mW is 0.8 V, below the 1 V range; f = 0.05/sr at theta_r = 45 deg is 23 uV, 500
+// times the noise of 4 nV/rtHz through 12 dB per octave at 1 ms (45 nV).
 void world_defaults(struct world_spec *ret_spec)
 {
     *ret_spec = (struct world_spec){

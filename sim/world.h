@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The simulated bench's world: sample, three axes, laser, optics and detector chain, in one struct that
-// is stepped by the times passed in. No I/O, no clock: with the same seed and the same calls at the same
-// times it is the same world, at any speed. Thread: one.
+// The simulated bench's world: sample, three axes, laser, optics and detector chain, in one struct
+// that is stepped by the times passed in. No I/O, no clock: with the same seed and the same calls
+// at the same times it is the same world, at any speed. Thread: one.
 //
 // Light is evaluated lazily. world_see brings laser and filter up to a time, in steps of 1/8 time
 // constant and at most 60 time constants back (older input is forgotten by any filter to 1e-20).
-// Whatever changes the light (a move, a laser command, a filter setting) calls it first, so that the
-// past is filtered as it was. Times before the last one count as the last one.
+// Whatever changes the light (a move, a laser command, a filter setting) calls it first, so that
+// the past is filtered as it was. Times before the last one count as the last one.
 #pragma once
 #include "sim/laser.h"
 #include "sim/lockin.h"
@@ -20,8 +20,8 @@
 enum world_axis { WORLD_THETA_I, WORLD_THETA_R, WORLD_SAMPLE, WORLD_AXES };
 
 struct world_axis_spec {
-    double min, max;  // hard limits: deg, deg, mm
-    double start;     // where it stands at power-up
+    double min, max; // hard limits: deg, deg, mm
+    double start;    // where it stands at power-up
     double backlash;
 };
 
@@ -31,7 +31,8 @@ struct world_spec {
     struct world_axis_spec axis[WORLD_AXES];
     struct sim_laser_spec laser;
     double responsivity_v_per_w, offset_v, noise_v_per_rthz; // signal
-    double monitor_v_per_w, monitor_dark_v, monitor_noise_v; // Aux In 1; noise is rms of one reading
+    double monitor_v_per_w, monitor_dark_v,
+        monitor_noise_v; // Aux In 1; noise is rms of one reading
     double reference_hz;
 };
 
@@ -57,6 +58,6 @@ void world_defaults(struct world_spec *ret_spec); // a painted sample under 50 m
 void world_init(struct world *w, const struct world_spec *spec, int64_t t_ns);
 void world_see(struct world *w, int64_t t_ns);
 double world_input_v(struct world *w, int64_t t_ns); // the lock-in's input without noise
-double world_aux_v(struct world *w, int input);            // Aux In 1..4 now, with noise, steps of 1/3 mV
+double world_aux_v(struct world *w, int input);      // Aux In 1..4 now, with noise, steps of 1/3 mV
 // Rests after power-up or a jump: the filter has seen the present input for ever.
 void world_settle(struct world *w);

@@ -53,22 +53,28 @@ static void the_table_has_the_worlds_own_defaults(void **state)
     const struct world_spec *a = &c.bench.world, *b = &own.world;
     assert_memory_equal(&a->optics.sample, &b->optics.sample, sizeof b->optics.sample);
     assert_int_equal(a->optics.diffuse, b->optics.diffuse);
-    assert_true(a->optics.distance_mm == b->optics.distance_mm && a->optics.divergence_deg == b->optics.divergence_deg);
+    assert_true(a->optics.distance_mm == b->optics.distance_mm &&
+                a->optics.divergence_deg == b->optics.divergence_deg);
     assert_true(a->optics.aperture_radius_mm == b->optics.aperture_radius_mm);
     assert_true(a->optics.transmission == b->optics.transmission);
-    assert_true(a->laser.warmup_s == b->laser.warmup_s && a->laser.temperatures_s == b->laser.temperatures_s);
+    assert_true(a->laser.warmup_s == b->laser.warmup_s &&
+                a->laser.temperatures_s == b->laser.temperatures_s);
     assert_true(a->laser.rin_rms == b->laser.rin_rms && a->laser.rin_tau_s == b->laser.rin_tau_s);
-    assert_true(a->laser.drift_rms == b->laser.drift_rms && a->laser.drift_tau_s == b->laser.drift_tau_s);
-    assert_true(a->laser.power_max_w == b->laser.power_max_w && a->laser.power_w == b->laser.power_w);
+    assert_true(a->laser.drift_rms == b->laser.drift_rms &&
+                a->laser.drift_tau_s == b->laser.drift_tau_s);
+    assert_true(a->laser.power_max_w == b->laser.power_max_w &&
+                a->laser.power_w == b->laser.power_w);
     assert_true(a->responsivity_v_per_w == b->responsivity_v_per_w && a->offset_v == b->offset_v);
-    assert_true(a->noise_v_per_rthz == b->noise_v_per_rthz && a->monitor_v_per_w == b->monitor_v_per_w);
+    assert_true(a->noise_v_per_rthz == b->noise_v_per_rthz &&
+                a->monitor_v_per_w == b->monitor_v_per_w);
     assert_true(a->monitor_dark_v == b->monitor_dark_v && a->monitor_noise_v == b->monitor_noise_v);
     assert_true(a->seed == b->seed && a->reference_hz == b->reference_hz);
     assert_memory_equal(a->axis, b->axis, sizeof b->axis);
     assert_memory_equal(c.bench.steps_per_unit, own.steps_per_unit, sizeof own.steps_per_unit);
     assert_true(c.bench.home_speed == own.home_speed && c.bench.start_s == own.start_s);
     assert_true(c.bench.home_acceleration == own.home_acceleration);
-    assert_true(c.bench.laser_reply_s == own.laser_reply_s && c.bench.detector_reply_s == own.detector_reply_s);
+    assert_true(c.bench.laser_reply_s == own.laser_reply_s &&
+                c.bench.detector_reply_s == own.detector_reply_s);
     assert_true(c.bench.axes_reply_s == own.axes_reply_s && c.bench.homed == own.homed);
 }
 
@@ -124,7 +130,8 @@ static void a_file_sets_what_it_names_and_mistakes_set_nothing(void **state)
     assert_int_equal(load(&c, "seed = 5;\nsample: { n = 2; diffuse = \"lambert\"; };\n"), 0);
     assert_int_equal(c.seed, 5);
     assert_true(c.bench.world.optics.sample.n == 2 && c.bench.world.optics.sample.kd == 0.05);
-    assert_true(c.bench.world.axis[WORLD_THETA_R].max == 185); // what the table does not reach stays
+    assert_true(c.bench.world.axis[WORLD_THETA_R].max ==
+                185); // what the table does not reach stays
     struct sim_config before = c;
     assert_int_equal(load(&c, "seed = 6;\nsample: { nn = 2.0; };\n"), GON_E_INPUT);
     assert_non_null(strstr(lines, ":2:"));
@@ -142,7 +149,8 @@ static void the_shipped_file_is_the_defaults(void **state)
     if (rc)
         fail_msg("%s", lines);
     assert_memory_equal(&file, &c, sizeof c);
-    assert_int_equal(sim_config_file(&file, "configs/sim-glossy.cfg", (struct cfg_sink){hear, NULL}), 0);
+    assert_int_equal(
+        sim_config_file(&file, "configs/sim-glossy.cfg", (struct cfg_sink){hear, NULL}), 0);
 }
 
 static void the_bench_file_says_where_everything_is(void **state)
@@ -153,10 +161,13 @@ static void the_bench_file_says_where_everything_is(void **state)
     struct sim_config c = defaults();
     sim_config_fast(&c);
     FILE *out = open_memstream(&text, &size);
-    benchfile_write(out, &c, &(struct benchfile_links){"modbus-tcp:127.0.0.1:1", "tcp:127.0.0.1:2", "tcp:127.0.0.1:3"});
+    benchfile_write(
+        out, &c,
+        &(struct benchfile_links){"modbus-tcp:127.0.0.1:1", "tcp:127.0.0.1:2", "tcp:127.0.0.1:3"});
     fclose(out);
     assert_non_null(strstr(text, "link = \"modbus-tcp:127.0.0.1:1\""));
-    assert_non_null(strstr(text, "name = \"theta_r\"; driver = \"oriental-az\"; bus = \"axes\"; unit = 2;"));
+    assert_non_null(
+        strstr(text, "name = \"theta_r\"; driver = \"oriental-az\"; bus = \"axes\"; unit = 2;"));
     assert_non_null(strstr(text, "speed = 300.0; acceleration = 60000.0; backlash = 0.02;"));
     assert_non_null(strstr(text, "time_constant_s = 0.001; slope_db = 12;"));
     struct cfg_file *f = cfg_parse(text, "goniod.cfg", (struct cfg_sink){hear, NULL}); // its syntax

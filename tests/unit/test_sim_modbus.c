@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: sim model base
-// Modbus frames against the standards' own examples, and the AZ register map moving an axis in virtual time.
+// Modbus frames against the standards' own examples, and the AZ register map moving an axis in
+// virtual time.
 #include "sim/bench.h"
 
 #include <math.h>
@@ -11,9 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MS(ms) ((int64_t)((ms) * 1e6))
+#define MS(ms) ((int64_t)((ms)*1e6))
 
-// --- a plain unit ---------------------------------------------------------------------------------------
+// --- a plain unit
+// ---------------------------------------------------------------------------------------
 
 static int read_plain(void *ctx, int address, int count, uint16_t *ret, int64_t t_ns)
 {
@@ -77,7 +79,8 @@ static void exchange(struct plain *p, const char *request, const char *reply)
     p->t_ns += MS(50);
     size_t got = port_take(&p->m.port, p->t_ns, out, NULL);
     if (got > 0 && !p->m.tcp) {
-        assert_int_equal(sim_modbus_crc(out, got), 0); // a frame with its CRC divides without remainder
+        assert_int_equal(sim_modbus_crc(out, got),
+                         0); // a frame with its CRC divides without remainder
         got -= 2;
     }
     assert_int_equal(got, size);
@@ -89,9 +92,12 @@ static void crc_of_known_frames(void **state)
 {
     (void)state;
     uint8_t f[64];
-    assert_int_equal(sim_modbus_crc((const uint8_t *)"123456789", 9), 0x4b37); // catalogue check value
-    size_t n = bytes("07 10 62 00 00 08 10 00 01 00 00 27 10 00 00 27 10 27 10 00 00 00 10 8D 50", f);
-    assert_int_equal(sim_modbus_crc(f, n - 2), f[n - 1] << 8 | f[n - 2]); // a manufacturer's example
+    assert_int_equal(sim_modbus_crc((const uint8_t *)"123456789", 9),
+                     0x4b37); // catalogue check value
+    size_t n =
+        bytes("07 10 62 00 00 08 10 00 01 00 00 27 10 00 00 27 10 27 10 00 00 00 10 8D 50", f);
+    assert_int_equal(sim_modbus_crc(f, n - 2),
+                     f[n - 1] << 8 | f[n - 2]); // a manufacturer's example
     n = bytes("07 10 62 00 00 08 DE 11", f);
     assert_int_equal(sim_modbus_crc(f, n - 2), f[n - 1] << 8 | f[n - 2]);
 }
@@ -104,7 +110,8 @@ static void every_function_answers_as_the_standard_says(void **state)
         exchange(p, "07 06 00 02 12 34", "07 06 00 02 12 34");
         exchange(p, "07 10 00 03 00 02 04 AB CD 00 05", "07 10 00 03 00 02");
         exchange(p, "07 03 00 02 00 03", "07 03 06 12 34 AB CD 00 05");
-        exchange(p, "07 17 00 02 00 02 00 02 00 01 02 77 88", "07 17 04 77 88 AB CD"); // the write first
+        exchange(p, "07 17 00 02 00 02 00 02 00 01 02 77 88",
+                 "07 17 04 77 88 AB CD"); // the write first
         assert_int_equal(p->others[2], 0);
         free(p);
     }
@@ -140,7 +147,7 @@ static void strangers_and_broken_frames_get_silence(void **state)
     }
     p->t_ns = MS(400);
     exchange(p, "07 03 00 00 00 01", "07 03 02 00 00"); // and is well again
-    exchange(p, "00 06 00 01 00 2A", ""); // broadcast: done, not answered
+    exchange(p, "00 06 00 01 00 2A", "");               // broadcast: done, not answered
     assert_int_equal(p->registers[1], 42);
     assert_int_equal(p->others[1], 42);
     exchange(p, "00 03 00 00 00 01", "");
@@ -227,17 +234,26 @@ static void faults_of_a_link_lose_and_delay_replies(void **state)
     assert_int_equal(port_take(&p->m.port, p->t_ns + MS(249), out, NULL), 0);
     assert_int_equal(port_take(&p->m.port, p->t_ns + MS(250), out, NULL), 11);
     p->t_ns += MS(300);
-    exchange(p, "00 03 00 00 00 06 07 03 00 02 00 01", "00 03 00 00 00 05 07 03 02 00 63"); // only once
+    exchange(p, "00 03 00 00 00 06 07 03 00 02 00 01",
+             "00 03 00 00 00 05 07 03 02 00 63"); // only once
     p->m.port.mute = true;
     exchange(p, "00 04 00 00 00 06 07 03 00 02 00 01", "");
     assert_int_equal(p->m.port.lost, 2);
     free(p);
 }
 
-// --- the AZ -------------------------------------------------------------------------------------------
+// --- the AZ
+// -------------------------------------------------------------------------------------------
 
 enum { ZHOME = 0x10, STOP = 0x20, FREE = 0x40, ALM_RST = 0x80 };
-enum { HOME_END = 0x10, READY = 0x20, ALM_A = 0x80, SYS_BSY = 0x100, MOVE = 0x2000, IN_POS = 0x4000 };
+enum {
+    HOME_END = 0x10,
+    READY = 0x20,
+    ALM_A = 0x80,
+    SYS_BSY = 0x100,
+    MOVE = 0x2000,
+    IN_POS = 0x4000
+};
 
 struct axes {
     struct bench bench;
@@ -298,7 +314,8 @@ static void one_frame_moves_an_axis(void **state)
     struct port *p = bench_port(&a->bench, BENCH_AXES);
     uint8_t out[PORT_REPLY_MOST], f[64];
     // Unit 2 to 10000 steps, 20000 steps/s, 60000 steps/s2 both ways, full current, start.
-    size_t n = bytes("02 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 27 10 00 00 4E 20 00 00 EA 60 00 00 EA 60 "
+    size_t n = bytes("02 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 27 10 00 00 4E 20 00 00 "
+                     "EA 60 00 00 EA 60 "
                      "00 00 03 E8 00 00 00 01",
                      f);
     uint16_t crc = sim_modbus_crc(f, n);
@@ -306,7 +323,8 @@ static void one_frame_moves_an_axis(void **state)
     f[n++] = (uint8_t)(crc >> 8);
     port_feed(p, f, n, MS(10));
     assert_int_equal(port_take(p, MS(10), out, NULL), 8);
-    // From 0 (counted from where it stands): 1/3 s and 10/3 deg each way, 10/3 deg at 20 deg/s; begins 2 ms later.
+    // From 0 (counted from where it stands): 1/3 s and 10/3 deg each way, 10/3 deg at 20 deg/s;
+    // begins 2 ms later.
     a->t_ns = MS(11);
     assert_int_equal(status(a, 2), READY | IN_POS); // the driver has not begun
     a->t_ns = MS(12 + 333.3333 + 83.3333);
@@ -319,7 +337,8 @@ static void one_frame_moves_an_axis(void **state)
     assert_int_equal(status(a, 2), READY | IN_POS);
     assert_int_equal(get(a, 2, 0xcc), 10000);
     assert_int_equal(get(a, 2, 0xc6), 10000);
-    assert_true(fabs(motion_at(&a->bench.world.axis[WORLD_THETA_R], a->t_ns).load - 2.5) < 1e-9); // from -7.5
+    assert_true(fabs(motion_at(&a->bench.world.axis[WORLD_THETA_R], a->t_ns).load - 2.5) <
+                1e-9); // from -7.5
     free(a);
 }
 
@@ -371,7 +390,8 @@ static void stop_acts_on_its_edge_and_holds_while_set(void **state)
     move(a, 2, 1, 90000, 20000, 60000);
     a->t_ns += MS(1000);
     uint16_t stop = STOP;
-    assert_int_equal(sim_az_write(&a->bench.az[1], 0x7d, 1, &stop, a->t_ns), 0); // the lower word alone
+    assert_int_equal(sim_az_write(&a->bench.az[1], 0x7d, 1, &stop, a->t_ns),
+                     0); // the lower word alone
     a->t_ns += MS(334);
     assert_false(status(a, 2) & (MOVE | READY));
     int32_t rest = get(a, 2, 0xcc);
@@ -480,7 +500,7 @@ static void registers_that_are_not_there_and_values_out_of_range(void **state)
     assert_int_equal(sim_az_read(z, 0xcc, 10, r, 0), 0);
     assert_int_equal(sim_az_read(z, 0x10, 1, r, 0), MODBUS_BAD_ADDRESS);
     assert_int_equal(sim_az_read(z, 0xd4, 4, r, 0), MODBUS_BAD_ADDRESS);
-    assert_int_equal(put(a, 1, 0x7e, 1), MODBUS_BAD_ADDRESS);    // read only
+    assert_int_equal(put(a, 1, 0x7e, 1), MODBUS_BAD_ADDRESS);     // read only
     assert_int_equal(put(a, 1, 0x5e, 5000000), MODBUS_BAD_VALUE); // 4 MHz at most
     assert_int_equal(put(a, 1, 0x60, 0), MODBUS_BAD_VALUE);
     assert_int_equal(put(a, 1, 0x5a, 5), MODBUS_BAD_VALUE);

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MS(ms) ((int64_t)((ms) * 1e6))
+#define MS(ms) ((int64_t)((ms)*1e6))
 
 struct rig {
     struct bench bench;
@@ -57,7 +57,8 @@ static const char *lockin(struct rig *r, const char *command)
     return say(r, BENCH_DETECTOR, command);
 }
 
-// --- Cobolt -------------------------------------------------------------------------------------------
+// --- Cobolt
+// -------------------------------------------------------------------------------------------
 
 static void the_laser_answers_lines(void **state)
 {
@@ -76,7 +77,9 @@ static void the_laser_answers_lines(void **state)
     assert_memory_equal(laser(r, "p 0.2\r"), "Error", 5); // above the most
     assert_memory_equal(laser(r, "p x\r"), "Syntax error", 12);
     assert_string_equal(laser(r, "p?\r"), "0.0421\r\n");
-    for (const char *const *q = (const char *const[]){"sn?", "gsn?", "glm?", "gfv?", "hrs?", "i?", "gam?", NULL}; *q; q++) {
+    for (const char *const *q =
+             (const char *const[]){"sn?", "gsn?", "glm?", "gfv?", "hrs?", "i?", "gam?", NULL};
+         *q; q++) {
         char line[16];
         snprintf(line, sizeof line, "%s\r", *q);
         assert_null(strstr(laser(r, line), "rror"));
@@ -107,9 +110,11 @@ static void half_a_command_is_ended_by_the_next_terminator(void **state)
     struct rig *r = rig();
     laser(r, "@cob1\r");
     r->t_ns += MS(3000);
-    assert_true(sim_laser_emits((sim_laser_step(&r->bench.world.laser, r->t_ns), &r->bench.world.laser)));
+    assert_true(
+        sim_laser_emits((sim_laser_step(&r->bench.world.laser, r->t_ns), &r->bench.world.laser)));
     laser(r, "p 0.0");
-    assert_memory_equal(say(r, BENCH_LASER, "\rl0\r"), "OK\r\n", 4); // "p 0.0" was a command, l0 came too early
+    assert_memory_equal(say(r, BENCH_LASER, "\rl0\r"), "OK\r\n",
+                        4); // "p 0.0" was a command, l0 came too early
     assert_true(sim_laser_emits(&r->bench.world.laser));
     assert_string_equal(laser(r, "\rl0\r"), "OK\r\n"); // an empty line is nothing
     assert_false(sim_laser_emits(&r->bench.world.laser));
@@ -187,7 +192,8 @@ static void an_echo_comes_before_the_answer(void **state)
     free(r);
 }
 
-// --- SR830 --------------------------------------------------------------------------------------------
+// --- SR830
+// --------------------------------------------------------------------------------------------
 
 static struct rig *listening(void)
 {
@@ -202,7 +208,8 @@ static void nothing_is_heard_before_outx(void **state)
     struct rig *r = rig();
     assert_string_equal(lockin(r, "*IDN?\r"), "");
     assert_string_equal(lockin(r, "OUTX 0\r"), "");
-    assert_string_equal(lockin(r, "*IDN?\r"), "Stanford_Research_Systems,SR830,s/n43480,ver1.07 \r");
+    assert_string_equal(lockin(r, "*IDN?\r"),
+                        "Stanford_Research_Systems,SR830,s/n43480,ver1.07 \r");
     assert_string_equal(lockin(r, "*ESR?\n"), "128\r"); // powered on; a line feed will do
     assert_string_equal(lockin(r, "*RST;OUTX?\r"), "0\r");
     free(r);
@@ -212,7 +219,8 @@ static void each_answer_on_a_line_has_its_own_terminator(void **state)
 {
     (void)state;
     struct rig *r = listening();
-    assert_string_equal(lockin(r, "SENS?;OFLT?;ofsl?;SYNC?;RMOD?;FREQ?\r"), "26\r8\r1\r0\r1\r1000.00\r");
+    assert_string_equal(lockin(r, "SENS?;OFLT?;ofsl?;SYNC?;RMOD?;FREQ?\r"),
+                        "26\r8\r1\r0\r1\r1000.00\r");
     assert_string_equal(lockin(r, "SENS 12;OFLT 4 ; OFSL 3\r"), "");
     assert_string_equal(lockin(r, "SENS?;OFLT?;OFSL?\r"), "12\r4\r3\r");
     assert_true(r->bench.world.lockin.full_scale_v == 2e-5);
@@ -248,7 +256,7 @@ static void exponents_have_three_digits(void **state)
     r->bench.world.spec.offset_v = 6.1e-5;
     r->bench.world.spec.noise_v_per_rthz = r->bench.world.lockin.noise_v_per_rthz = 0;
     r->t_ns += MS(10000);
-    assert_string_equal(lockin(r, "OUTP? 1\r"), "6.10352e-005\r"); // 4/65536 of 1 V
+    assert_string_equal(lockin(r, "OUTP? 1\r"), "6.10352e-005\r");      // 4/65536 of 1 V
     assert_string_equal(lockin(r, "SENS 13;OUTP? 1\r"), "5.45e-005\r"); // 109 % of 50 uV
     free(r);
 }
@@ -260,7 +268,9 @@ static void snap_takes_signal_frequency_and_monitor_at_once(void **state)
     double x, y, frequency, monitor;
     char end;
     r->t_ns += MS(1000);
-    assert_int_equal(sscanf(lockin(r, "SNAP? 1,2,9,5\r"), "%lf,%lf,%lf,%lf%c", &x, &y, &frequency, &monitor, &end), 5);
+    assert_int_equal(sscanf(lockin(r, "SNAP? 1,2,9,5\r"), "%lf,%lf,%lf,%lf%c", &x, &y, &frequency,
+                            &monitor, &end),
+                     5);
     assert_true(end == '\r' && frequency == 1000);
     assert_true(fabs(monitor - 0.002) < 0.0012);
     assert_true(fabs(x) < 1e-4 && fabs(y) < 1e-4);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: sim model base
-// The simulated world without its instruments. Statistical checks run on fixed seeds; their bounds are
-// five standard deviations, which another seed would break once in 1.7 million.
+// The simulated world without its instruments. Statistical checks run on fixed seeds; their bounds
+// are five standard deviations, which another seed would break once in 1.7 million.
 #include "sim/world.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 #include <cmocka.h>
 #include <string.h>
 
-#define S(s) ((int64_t)((s) * 1e9))
+#define S(s) ((int64_t)((s)*1e9))
 #define PI 3.14159265358979323846
 
 static void near(double value, double expected, double tolerance)
@@ -54,7 +54,8 @@ static void streams_and_seeds_differ_and_repeat(void **state)
     assert_true(x != noise_bits(&d));
 }
 
-// --- motion -------------------------------------------------------------------------------------------
+// --- motion
+// -------------------------------------------------------------------------------------------
 
 static struct motion an_axis(double backlash)
 {
@@ -67,7 +68,8 @@ static void a_long_move_takes_cruise_and_two_ramps(void **state)
 {
     (void)state;
     struct motion m = an_axis(0);
-    motion_go(&m, 50, 20, 40, 80, S(1)); // 0.5 s and 5 deg up, 0.25 s and 2.5 deg down, 42.5 deg at 20
+    motion_go(&m, 50, 20, 40, 80,
+              S(1)); // 0.5 s and 5 deg up, 0.25 s and 2.5 deg down, 42.5 deg at 20
     near(motion_left_s(&m, S(1)), 0.5 + 42.5 / 20 + 0.25, 1e-12);
     near(motion_at(&m, S(1.25)).motor, 0.5 * 40 * 0.25 * 0.25, 1e-9);
     near(motion_at(&m, S(1.25)).speed, 10, 1e-9);
@@ -159,7 +161,8 @@ static void a_hard_limit_stops_the_motor_there(void **state)
     assert_true(s.motor == 100 && !s.moving && s.speed == 0);
 }
 
-// --- laser --------------------------------------------------------------------------------------------
+// --- laser
+// --------------------------------------------------------------------------------------------
 
 static struct sim_laser a_laser(void)
 {
@@ -236,7 +239,8 @@ static void an_open_interlock_ends_emission_and_asks_for_the_key(void **state)
     assert_true(sim_laser_emits(&l));
 }
 
-// --- optics -------------------------------------------------------------------------------------------
+// --- optics
+// -------------------------------------------------------------------------------------------
 
 static double detected(double theta_i, double theta_r, double sample_mm)
 {
@@ -273,7 +277,7 @@ static void the_beam_is_where_it_should_be_and_nowhere_else(void **state)
     assert_true(detected(0, 180, 30) == 0.05);
     assert_true(detected(0, -180, 30) == 0.05); // the same place
     assert_true(detected(20, 160, 30) == 0.05);
-    assert_true(detected(20, 160.8, 30) == 0.05); // flat within 0.917 - 0.05 deg
+    assert_true(detected(20, 160.8, 30) == 0.05);    // flat within 0.917 - 0.05 deg
     near(detected(20, 160.9167, 30), 0.025, 0.0005); // half way down the edge
     assert_true(detected(20, 160.97, 30) == 0);
     assert_true(detected(20, 159.03, 30) == 0);
@@ -296,7 +300,8 @@ static void a_term_that_is_off_adds_nothing(void **state)
     assert_int_equal(optics_term("ghost"), -1);
 }
 
-// --- lock-in ------------------------------------------------------------------------------------------
+// --- lock-in
+// ------------------------------------------------------------------------------------------
 
 // Times in time constants until the residual of a step is 1e-2 .. 1e-6, to 0.05 (instruments.md 1).
 static const double settle_tc[4][5] = {{4.6, 6.9, 9.2, 11.5, 13.8},
@@ -351,7 +356,8 @@ static void noise_is_as_strong_and_as_correlated_as_theory_says(void **state)
             before = v;
         }
         double variance = 16e-18 * bandwidth_tc[p] / 1e-3;
-        // Correlated samples count for fewer: with sum over lags of rho^2 below 2.5, sd < sqrt(2 * 6 / N).
+        // Correlated samples count for fewer: with sum over lags of rho^2 below 2.5, sd < sqrt(2 *
+        // 6 / N).
         near(sum2 / N / variance, 1, 5 * sqrt(12.0 / N));
         near(lag / sum2, expected[p], 5 * sqrt(6.0 / N));
     }
@@ -405,7 +411,8 @@ static void the_phase_turns_x_into_y(void **state)
     near(lockin_y_v(&l), -0.25, 2e-5);
 }
 
-// --- the whole world ----------------------------------------------------------------------------------
+// --- the whole world
+// ----------------------------------------------------------------------------------
 
 static void put(struct world *w, double theta_i, double theta_r, double sample_mm)
 {
@@ -442,7 +449,7 @@ static void the_beam_fits_the_largest_range_and_scatter_stands_out_of_the_noise(
     put(&w, 45, -45, 0);
     double f = optics_f_per_sr(&w.spec.optics, 45, -45);
     near(f, 0.05 / cos(PI / 4), 0.02); // diffuse, a little of the lobe
-    world_see(&w, S(11.9)); // down from the beam before the range goes down
+    world_see(&w, S(11.9));            // down from the beam before the range goes down
     w.lockin.full_scale_v = 5e-5;
     w.lockin.condition = 0;
     double sum = 0, sum2 = 0;
@@ -454,7 +461,8 @@ static void the_beam_fits_the_largest_range_and_scatter_stands_out_of_the_noise(
     }
     double mean = sum / N, sd = sqrt(sum2 / N - mean * mean);
     assert_true(mean * 0.05 / f > 300 * sd); // a reading at 0.05 per sr
-    near(mean, 16 * 0.05 * f * optics_solid_angle_sr(&w.spec.optics) * cos(PI / 4) + 2e-7, 0.02 * mean);
+    near(mean, 16 * 0.05 * f * optics_solid_angle_sr(&w.spec.optics) * cos(PI / 4) + 2e-7,
+         0.02 * mean);
     assert_int_equal(w.lockin.condition, 0);
 }
 
@@ -472,7 +480,8 @@ static void looking_late_or_often_shows_the_same_light(void **state)
         world_see(&b, S(10) + S(0.0001) * i);
     // Steps of 1/8 TC against shorter ones: the signal climbs within them.
     near(a.lockin.x[1], b.lockin.x[1], 1e-4 * b.lockin.x[1]);
-    assert_true(fabs(b.lockin.x[1] / world_input_v(&b, S(10.2503)) - 1) > 1e-3); // it lags behind the input
+    assert_true(fabs(b.lockin.x[1] / world_input_v(&b, S(10.2503)) - 1) >
+                1e-3); // it lags behind the input
     world_see(&a, S(11));
     world_see(&b, S(11));
     near(a.lockin.x[1], b.lockin.x[1], 1e-12);
