@@ -35,7 +35,7 @@ struct laser_status {
 
 struct laser_ops {
     int (*identify)(struct laser *l, char *ret_text, size_t size, struct gon_error *err);
-    // Everything, asked now. Cobolt: 4 commands (5 with a fault, 1 more the first time), 0.1 s each.
+    // Everything, asked now. Cobolt: 5 commands (6 the first time), 0.1 s each.
     int (*status)(struct laser *l, struct laser_status *ret_status, struct gon_error *err);
     // One command, 0.1 s at most: whether the laser says that light comes out.
     int (*emission)(struct laser *l, bool *ret_emission, struct gon_error *err);
@@ -57,7 +57,8 @@ struct laser {
 // Cobolt 05-01 series (Rumba) over RS-232 or USB. Opens the link only and sends nothing: call off first,
 // then identify. The laser ignores a command that comes less than 100 ms after the one before; the gaps
 // are kept through the clock, which so gets its turn. Queries are repeated up to 3 times when the link
-// fails. on is "@cob1" (the sequence with temperatures and key) where autostart is enabled, else "l1":
+// fails. An interlock that was opened while the laser was not off needs the key (LASER_NEEDS_KEY) once it is
+// closed again. on is "@cob1" (the sequence with temperatures and key) where autostart is enabled, else "l1":
 // the laser's own settings are not changed.
 int laser_cobolt_open(const char *link, struct clk *clk, const struct cancel *cancel,
                       struct laser **ret_laser, struct gon_error *err);

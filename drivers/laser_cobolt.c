@@ -135,21 +135,26 @@ static int identify(struct laser *l, char *ret_text, size_t size, struct gon_err
 
 // --- status -----------------------------------------------------------------------------------------
 
+// An interlock that was opened and is closed again leaves the laser in its fault until the key was
+// turned. Fault 3 without that state was latched while nothing was on: it means nothing any more.
 static enum laser_state state_of(enum mode mode, bool emission, bool interlock_closed, int fault)
 {
-    if (!interlock_closed || fault == FAULT_INTERLOCK)
+    if (!interlock_closed)
         return LASER_INTERLOCK;
     switch (mode) {
     case MODE_TEMPERATURES:
     case MODE_WARMING: return LASER_WARMING;
     case MODE_KEY: return LASER_NEEDS_KEY;
     case MODE_COMPLETED: return emission ? LASER_EMITTING : LASER_OFF;
-    case MODE_FAULT: return LASER_FAULT;
+    case MODE_FAULT: return fault == FAULT_INTERLOCK ? LASER_NEEDS_KEY : LASER_FAULT;
     case MODE_OFF:
     case MODE_ABORTED:
     case MODE_REMOTE:
     case MODE_STANDBY:
-    default: return emission ? LASER_WARMING : LASER_OFF;
+    default:
+        if (emission)
+            return LASER_WARMING;
+        return fault && fault != FAULT_INTERLOCK ? LASER_FAULT : LASER_OFF;
     }
 }
 
@@ -175,7 +180,7 @@ static int status(struct laser *l, struct laser_status *ret_status, struct gon_e
         rc = ask_int(c, "gom?", MODES - 1, &mode, err);
     if (rc == 0)
         rc = ask_watts(c, "pa?", &power_w, err);
-    if (rc == 0 && mode == MODE_FAULT)
+    if (rc == 0)
         rc = ask_int(c, "f?", FAULTS_MOST, &fault, err);
     if (rc == 0 && isnan(c->setpoint_w))
         rc = ask_watts(c, "p?", &c->setpoint_w, err);
@@ -235,13 +240,13 @@ static int check_may_start(struct laser *l, struct gon_error *err)
     if (rc < 0)
         return rc;
     if (s.state == LASER_INTERLOCK)
-        return gon_fail(err, GON_E_REFUSED, "laser stays off: %s",
-                        s.interlock_closed ? "its interlock was opened; clear that with the key switch"
-                                           : "the interlock is open");
+        return gon_fail(err, GON_E_REFUSED, "laser stays off: the interlock is open");
+    if (s.state == LASER_NEEDS_KEY)
+        return gon_fail(err, GON_E_REFUSED, "laser stays off: turn its key switch off and on");
     if (s.state == LASER_FAULT)
         return gon_fail(err, GON_E_DEVICE, "laser stays off: fault %d (%s)", s.fault_code,
                         fault_text(s.fault_code));
-    return 0;
+    return s.fault_code == FAULT_INTERLOCK ? tell(cobolt_of(l), "cf", err) : 0;
 }
 
 // Why the laser did not want to: most often the key, which cannot be seen otherwise.

@@ -20,6 +20,7 @@ struct noisy {
     int64_t late_most_ns;  // of a late answer, from when it was due
     int64_t double_most_ns;
     uint64_t faults;
+    int lose_nth;          // this answer from now gets lost; 0: none
 };
 
 static inline unsigned noisy_roll(struct noisy *n, unsigned sides)
@@ -44,6 +45,8 @@ static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int6
     unsigned fault = n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
     if (n->only && !(n->only >> fault & 1))
         fault = NOISY_FAULTS;
+    if (n->lose_nth > 0 && --n->lose_nth == 0)
+        return;
     n->faults += fault < NOISY_FAULTS;
     switch (fault) {
     case NOISY_LOST: return;
