@@ -90,7 +90,8 @@ static int library_open(const char *name, struct serial_port *p)
         return error ? error : EIO;
     }
     p->library = port;
-    sp_get_port_handle(port, &p->fd);
+    sp_get_port_handle(port, &p->fd); // 0.1.1 opens it non-blocking, but leaves it to children
+    fcntl(p->fd, F_SETFD, FD_CLOEXEC);
     return 0;
 }
 
