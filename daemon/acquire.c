@@ -7,12 +7,12 @@
 
 #include <math.h>
 
-#define SATURATED 0.95    // of full scale
-#define NEARLY_FULL 0.7   // of full scale: the next reading begins one range up
-#define HEADROOM 2.0      // of a range chosen for a known signal
-#define STEPS 30000.0     // a full scale has at least so many steps: what is below one is not known
-#define SAMPLE_TRIES 3    // for one answer that is not a number
-#define FALL_MOST 1e-5    // of a signal, that is waited out
+#define SATURATED 0.95  // of full scale
+#define NEARLY_FULL 0.7 // of full scale: the next reading begins one range up
+#define HEADROOM 2.0    // of a range chosen for a known signal
+#define STEPS 30000.0   // a full scale has at least so many steps: what is below one is not known
+#define SAMPLE_TRIES 3  // for one answer that is not a number
+#define FALL_MOST 1e-5  // of a signal, that is waited out
 
 void acquire_begin(struct acquire *a)
 {
@@ -86,7 +86,8 @@ static double sd(const struct tally *t)
     return t->n > 1 ? sqrt(t->squares / (t->n - 1)) : 0.0;
 }
 
-// The first sample tells how far the signal fell: what is left of the old one has to be small against it.
+// The first sample tells how far the signal fell: what is left of the old one has to be small
+// against it.
 static int first_sample(struct instrument *in, const struct acquire *a, int64_t since_ns,
                         const struct cancel *cancel, struct detector_sample *ret_sample,
                         struct gon_error *err)
@@ -104,12 +105,13 @@ static int first_sample(struct instrument *in, const struct acquire *a, int64_t 
 }
 
 // Saturated samples end it: more of them say nothing more.
-static int take_samples(struct instrument *in, const struct acquire *a, const struct acquire_wish *wish,
-                        const struct cancel *cancel, struct acquire_reading *r, struct gon_error *err)
+static int take_samples(struct instrument *in, const struct acquire *a,
+                        const struct acquire_wish *wish, const struct cancel *cancel,
+                        struct acquire_reading *r, struct gon_error *err)
 {
     const double full_v = instrument_full_scale_v(in, a->range);
-    const int64_t spacing_ns = CLK_S(plan_spacing_s(instrument_time_constant_s(in),
-                                                       instrument_bench(in)->detector.slope_db));
+    const int64_t spacing_ns = CLK_S(
+        plan_spacing_s(instrument_time_constant_s(in), instrument_bench(in)->detector.slope_db));
     struct tally signal = {0}, monitor = {0};
     int64_t next_ns = 0;
     for (int k = 0; k < wish->count && !(r->flags & STORE_SATURATED); k++) {
@@ -137,7 +139,8 @@ static int take_samples(struct instrument *in, const struct acquire *a, const st
     return 0;
 }
 
-static int fitting_range(struct instrument *in, const struct acquire *a, const struct acquire_reading *r)
+static int fitting_range(struct instrument *in, const struct acquire *a,
+                         const struct acquire_reading *r)
 {
     const double step_v = instrument_full_scale_v(in, r->range) / STEPS;
     const double need_v = HEADROOM * (fabs(r->signal_v) + 3.0 * r->signal_sd_v + step_v);
@@ -171,7 +174,8 @@ static void judge(struct instrument *in, struct acquire *a, struct acquire_readi
         if (r->range > a->least_range &&
             signal_v < ACQUIRE_UNDER * instrument_full_scale_v(in, r->range - 1))
             a->range = fitting_range(in, a, r);
-        if (a->range < r->range && signal_v < ACQUIRE_POOR * instrument_full_scale_v(in, r->range)) {
+        if (a->range < r->range &&
+            signal_v < ACQUIRE_POOR * instrument_full_scale_v(in, r->range)) {
             r->flags |= STORE_UNDER_RANGE;
             r->accepted = false;
             r->again = true;

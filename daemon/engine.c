@@ -7,65 +7,46 @@
 #include "campaign/plan.h"
 #include "campaign/store.h"
 #include "daemon/acquire.h"
+#include "daemon/engine_inside.h"
 #include "daemon/instrument.h"
 #include "daemon/travel.h"
 
-#include <assert.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#define ATTEMPTS_MORE 3           // attempts at a point: the ranges and these
-#define RETURNS_MOST 5            // pauses that ended by themselves, without a reading between them
-#define LASER_LOOK_NS CLK_S(1)    // how often the laser itself is asked while it is on
-#define EMITTING_LEAST_S 600.0    // how long a laser may take to reach its set-point, at least
-#define OFF_AT_FIRST_S 5.0        // and to leave "off" after it accepted ON
-#define STEADY_REL 0.005          // change of the monitor in a second, to call it steady
-#define STEADY_LEAST_S 60.0       // how long it may take to become so, at least
-#define MONITOR_LOST 0.5          // of the monitor after warm-up: below it the light is lost
-#define AGAIN 1                   // not done, but nothing is wrong
+#define ATTEMPTS_MORE 3  // attempts at a point: the ranges and these
+#define RETURNS_MOST 5   // pauses that ended by themselves, without a reading between them
+#define MONITOR_LOST 0.5 // of the monitor after warm-up: below it the light is lost
+#define AGAIN 1          // not done, but nothing is wrong
 #define STORE_RETRY_NS CLK_S(1)
-
-struct engine {
-    const struct engine_ports *ports;
-    struct instrument *in;
-    const struct campaign_config *config;
-    const struct plan *plan;
-
-    enum run_state state;
-    const struct plan_point *point; // in progress; NULL: none
-    int done, attempt;
-    bool ready;  // connected, homed
-    bool lit;    // laser on, warmed up, monitor steady
-    bool dark;   // laser off, read back at this campaign's own request
-    int returns; // pauses that ended by themselves since the last accepted reading
-    int64_t light_ns, laser_look_ns;
-    struct acquire acquire;
-
-    double omega_sr, monitor_dark_v, monitor_lit_v;
-    struct engine_opening opening;
-    int64_t first_ns;
-    int first_done;
-    struct gon_error why; // of the last failure
-};
 
 const char *run_state_name(enum run_state s)
 {
     switch (s) {
-    case RUN_QUEUED: return "queued";
-    case RUN_PREPARING: return "preparing";
-    case RUN_RUNNING: return "running";
-    case RUN_PAUSED: return "paused";
-    case RUN_STOPPING: return "stopping";
-    case RUN_STOPPED: return "stopped";
-    case RUN_DONE: return "done";
-    case RUN_FAILED: return "failed";
+    case RUN_QUEUED:
+        return "queued";
+    case RUN_PREPARING:
+        return "preparing";
+    case RUN_RUNNING:
+        return "running";
+    case RUN_PAUSED:
+        return "paused";
+    case RUN_STOPPING:
+        return "stopping";
+    case RUN_STOPPED:
+        return "stopped";
+    case RUN_DONE:
+        return "done";
+    case RUN_FAILED:
+        return "failed";
     }
     return "unknown";
 }
 
-// --- what is said ------------------------------------------------------------------------------------
+// --- what is said
+// ------------------------------------------------------------------------------------
 
 static double seconds_left(const struct engine *e)
 {
@@ -76,7 +57,8 @@ static double seconds_left(const struct engine *e)
     return s / here * (e->plan->count - e->done);
 }
 
-static struct engine_event event_of(const struct engine *e, enum engine_event_kind kind, const char *text)
+static struct engine_event event_of(const struct engine *e, enum engine_event_kind kind,
+                                    const char *text)
 {
     const struct plan_point *p = e->point;
     return (struct engine_event){
@@ -96,10 +78,8 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
     };
 }
 
-// An event row, and the same for whoever watches.
-static void say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt, ...)
-    __attribute__((format(printf, 4, 5)));
-static void say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt, ...)
+void engine_say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt,
+                ...)
 {
     char text[640];
     va_list ap;
@@ -124,16 +104,19 @@ static void enter(struct engine *e, enum run_state state, const char *text)
     e->ports->publish(e->ports->ctx, &event);
 }
 
-// --- the safe state, and waiting in it ---------------------------------------------------------------
+// --- the safe state, and waiting in it
+// ---------------------------------------------------------------
 
 static int canceled(struct engine *e)
 {
     return gon_fail(&e->why, GON_E_CANCELED, "stopped");
 }
 
-static int nap(struct engine *e, int64_t ns)
+int engine_nap(struct engine *e, int64_t ns)
 {
-    return instrument_wait(e->in, clk_now_ns(e->ports->clk) + ns, e->ports->cancel) < 0 ? canceled(e) : 0;
+    return instrument_wait(e->in, clk_now_ns(e->ports->clk) + ns, e->ports->cancel) < 0
+               ? canceled(e)
+               : 0;
 }
 
 static void make_safe(struct engine *e)
@@ -143,7 +126,7 @@ static void make_safe(struct engine *e)
     e->ready = e->lit = e->dark = false;
     instrument_permit(e->in, false);
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
-        say(e, ENGINE_LOG, "err", "%s", err.text);
+        engine_say(e, ENGINE_LOG, "err", "%s", err.text);
     travel_stop(e->in, NULL);
 }
 
@@ -152,16 +135,21 @@ static bool resume_asked(struct engine *e)
     return e->ports->take_resume(e->ports->ctx);
 }
 
-static bool pause_asked(struct engine *e)
+bool engine_pause_asked(struct engine *e)
 {
     return e->ports->take_pause && e->ports->take_pause(e->ports->ctx);
+}
+
+int engine_operator_paused(struct engine *e)
+{
+    return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
 }
 
 static int wait_for_operator(struct engine *e)
 {
     int64_t tend_ns = 0;
     while (!resume_asked(e)) {
-        if (nap(e, CLK_MS(100)) < 0)
+        if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;
         if (clk_now_ns(e->ports->clk) >= tend_ns) {
             instrument_tend(e->in);
@@ -175,12 +163,12 @@ static int wait_for_operator(struct engine *e)
 static int wait_for_devices(struct engine *e)
 {
     do {
-        if (pause_asked(e)) {
+        if (engine_pause_asked(e)) {
             enter(e, RUN_PAUSED, "paused by the operator; go on with: gonio resume");
             return wait_for_operator(e);
         }
         (void)resume_asked(e); // it goes on by itself anyway
-        if (nap(e, CLK_MS(100)) < 0)
+        if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;
     } while (instrument_reconnect(e->in) > 0);
     return 0;
@@ -227,9 +215,11 @@ static int pause_run(struct engine *e)
     return rc;
 }
 
-// --- storing -----------------------------------------------------------------------------------------
+// --- storing
+// -----------------------------------------------------------------------------------------
 
-// The row is offered until it is accepted: nothing that was measured is lost, and nothing goes on before.
+// The row is offered until it is accepted: nothing that was measured is lost, and nothing goes on
+// before.
 static int store(struct engine *e, const struct store_reading *row)
 {
     const enum run_state before = e->state;
@@ -257,7 +247,8 @@ static double u_of_mean(double sd, int count)
     return count > 1 ? sd / sqrt(count) : 0.0;
 }
 
-// Underfilled or overfilled f_r with the opening references (metrology.md 1); the last word is reduce's.
+// Underfilled or overfilled f_r with the opening references (metrology.md 1); the last word is
+// reduce's.
 static void provisional(const struct engine *e, const struct acquire_reading *r, double theta_i_deg,
                         double theta_r_deg, double *ret_f, double *ret_u)
 {
@@ -267,9 +258,8 @@ static void provisional(const struct engine *e, const struct acquire_reading *r,
     const double beam = (o->beam_signal_v - o->dark_signal_v) /
                         (monitored ? o->beam_monitor_v - o->dark_monitor_v : 1.0);
     const double ratio = signal_v / (monitored ? r->monitor_v - o->dark_monitor_v : 1.0) / beam;
-    const double cosine =
-        cos(units_rad(instrument_bench(e->in)->regime == BENCH_OVERFILLED ? theta_i_deg
-                                                                                    : theta_r_deg));
+    const double cosine = cos(
+        units_rad(instrument_bench(e->in)->regime == BENCH_OVERFILLED ? theta_i_deg : theta_r_deg));
     const double u_signal_v = u_of_mean(r->signal_sd_v, r->count);
     const double u_monitor =
         monitored ? u_of_mean(r->monitor_sd_v, r->count) / (r->monitor_v - o->dark_monitor_v) : 0.0;
@@ -277,7 +267,8 @@ static void provisional(const struct engine *e, const struct acquire_reading *r,
     *ret_u = fabs(*ret_f) * hypot(u_signal_v / signal_v, u_monitor);
 }
 
-static void publish_reading(struct engine *e, const struct acquire_reading *r, const struct travel_pose *at)
+static void publish_reading(struct engine *e, const struct acquire_reading *r,
+                            const struct travel_pose *at)
 {
     struct engine_event event = event_of(e, ENGINE_READING, NULL);
     event.theta_i_deg = at->at[PART_THETA_I];
@@ -323,176 +314,8 @@ static struct store_reading row_of(const struct engine *e, const struct acquire_
     };
 }
 
-// --- laser -------------------------------------------------------------------------------------------
-
-static int laser_trouble(struct engine *e, const struct laser_status *s)
-{
-    const char *then = "then: gonio resume";
-    if (!s->interlock_closed || s->state == LASER_INTERLOCK)
-        return gon_fail(&e->why, GON_E_REFUSED, "laser: the interlock opened; close it, %s", then);
-    if (s->state == LASER_NEEDS_KEY)
-        return gon_fail(&e->why, GON_E_REFUSED, "laser: wants its key switch turned off and on, %s", then);
-    if (s->state == LASER_FAULT)
-        return gon_fail(&e->why, GON_E_DEVICE, "laser: fault %d (%s); clear it, %s", s->fault_code,
-                        safety_fault_text(instrument_safety(e->in), s->fault_code), then);
-    return 0;
-}
-
-// The laser was on and should be.
-static int check_laser(struct engine *e)
-{
-    struct laser_status s;
-    int rc = instrument_laser(e->in, &s, &e->why);
-    e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
-    if (rc >= 0)
-        rc = laser_trouble(e, &s);
-    if (rc >= 0 && !s.emission)
-        rc = gon_fail(&e->why, GON_E_DEVICE,
-                      "laser: went off by itself (state %s); look at it, then: gonio resume",
-                      laser_state_name(s.state));
-    return rc;
-}
-
-// The same with one short question, and only when it is due.
-static int watch_laser(struct engine *e)
-{
-    bool on;
-    if (!e->lit || clk_now_ns(e->ports->clk) < e->laser_look_ns)
-        return 0;
-    int rc = instrument_light(e->in, &on, &e->why);
-    e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
-    return rc < 0 || on ? rc : check_laser(e);
-}
-
-static int operator_paused(struct engine *e)
-{
-    return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
-}
-
-static int wait_until_emitting(struct engine *e)
-{
-    const double most_s = fmax(EMITTING_LEAST_S, 2.0 * instrument_bench(e->in)->laser.warmup_s);
-    const int64_t start_ns = clk_now_ns(e->ports->clk);
-    for (;;) {
-        struct laser_status s;
-        int rc = instrument_laser(e->in, &s, &e->why);
-        if (rc >= 0)
-            rc = laser_trouble(e, &s);
-        if (rc < 0)
-            return rc;
-        if (s.state == LASER_EMITTING && s.emission)
-            return 0;
-        const double s_since = (double)(clk_now_ns(e->ports->clk) - start_ns) * 1e-9;
-        if ((s.state == LASER_OFF && s_since > OFF_AT_FIRST_S) || s_since > most_s)
-            return gon_fail(&e->why, GON_E_DEVICE,
-                            "laser: still %s %.0f s after it accepted ON; look at it, then: gonio resume",
-                            laser_state_name(s.state), s_since);
-        if (pause_asked(e))
-            return operator_paused(e);
-        if (nap(e, CLK_MS(100)) < 0)
-            return GON_E_CANCELED;
-    }
-}
-
-static int watch_monitor(struct engine *e, double *ret_mean_v)
-{
-    double sum_v = 0;
-    for (int i = 0; i < 10; i++) {
-        struct detector_sample s;
-        if (nap(e, CLK_MS(50)) < 0)
-            return GON_E_CANCELED;
-        int rc = instrument_sample(e->in, &s, &e->why);
-        if (rc < 0)
-            return rc;
-        sum_v += s.monitor_v;
-    }
-    *ret_mean_v = sum_v / 10;
-    return 0;
-}
-
-// Two means half a second apart differ by less than half of what a second is allowed.
-static int wait_until_steady(struct engine *e)
-{
-    const double most_s = fmax(STEADY_LEAST_S, 2.0 * instrument_bench(e->in)->laser.warmup_s);
-    const int64_t until_ns = clk_now_ns(e->ports->clk) + CLK_S(most_s);
-    const double dark_v = isfinite(e->monitor_dark_v) ? e->monitor_dark_v : 0.0;
-    double before_v, now_v;
-    int rc = watch_monitor(e, &before_v);
-    for (; rc >= 0; before_v = now_v) {
-        rc = watch_monitor(e, &now_v);
-        if (rc < 0 || isnan(now_v)) // without a monitor there is nothing to see
-            break;
-        const double change = fabs(now_v - before_v) / fabs(now_v - dark_v);
-        e->monitor_lit_v = now_v;
-        if (change < 0.5 * STEADY_REL)
-            break;
-        if (clk_now_ns(e->ports->clk) > until_ns)
-            return gon_fail(&e->why, GON_E_DEVICE,
-                            "laser: says it emits, but the monitor (%.4g V, dark %.4g V) still changes by "
-                            "%.2g %% in half a second after %.0f s; look at laser, shutter and monitor, "
-                            "then: gonio resume",
-                            now_v, dark_v, 100.0 * change, most_s);
-        if (pause_asked(e))
-            return operator_paused(e);
-    }
-    return rc;
-}
-
-static int warm_up(struct engine *e)
-{
-    int rc = wait_until_emitting(e);
-    const int64_t until_ns = clk_now_ns(e->ports->clk) + CLK_S(instrument_bench(e->in)->laser.warmup_s);
-    while (rc >= 0 && clk_now_ns(e->ports->clk) < until_ns) {
-        const int64_t left_ns = until_ns - clk_now_ns(e->ports->clk);
-        if (pause_asked(e))
-            return operator_paused(e);
-        rc = nap(e, left_ns < CLK_MS(100) ? left_ns : CLK_MS(100));
-        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
-            rc = check_laser(e);
-    }
-    return rc < 0 ? rc : wait_until_steady(e);
-}
-
-static int light_up(struct engine *e)
-{
-    say(e, ENGINE_LOG, "notice", "laser on at %.4g W, warming up", instrument_bench(e->in)->laser.power_w);
-    int rc = instrument_power(e->in, instrument_bench(e->in)->laser.power_w, &e->why);
-    if (rc >= 0)
-        rc = instrument_emission_on(e->in, &e->why);
-    if (rc >= 0)
-        rc = warm_up(e);
-    if (rc < 0)
-        return rc;
-    e->lit = true;
-    e->dark = false;
-    e->light_ns = clk_now_ns(e->ports->clk);
-    e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
-    e->acquire.range = -1;
-    say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g V", e->monitor_lit_v);
-    return 0;
-}
-
-static int lights_out(struct engine *e)
-{
-    int rc = instrument_emission_off(e->in, &e->why);
-    if (rc < 0)
-        return rc;
-    e->lit = false;
-    e->dark = true;
-    e->light_ns = clk_now_ns(e->ports->clk);
-    e->acquire.range = -1;
-    return 0;
-}
-
-// Darks without light, everything else with it.
-static int light_for(struct engine *e)
-{
-    if (e->point->kind == PLAN_DARK)
-        return e->dark ? 0 : lights_out(e);
-    return e->lit ? 0 : light_up(e);
-}
-
-// --- points ------------------------------------------------------------------------------------------
+// --- points
+// ------------------------------------------------------------------------------------------
 
 static int prepare(struct engine *e)
 {
@@ -526,9 +349,12 @@ static int go_to(struct engine *e, struct travel_pose *ret_at)
 static int readings_of(const struct engine *e)
 {
     switch (e->point->kind) {
-    case PLAN_DARK: return e->config->dark_readings;
-    case PLAN_BEAM: return e->config->beam_readings;
-    default: return e->config->readings;
+    case PLAN_DARK:
+        return e->config->dark_readings;
+    case PLAN_BEAM:
+        return e->config->beam_readings;
+    default:
+        return e->config->readings;
     }
 }
 
@@ -536,26 +362,29 @@ static int readings_of(const struct engine *e)
 static int no_more_attempts(struct engine *e, const struct acquire_reading *r)
 {
     if (r->flags & STORE_MONITOR_LOW) {
-        int rc = check_laser(e);
+        int rc = engine_check_laser(e);
         return rc < 0 ? rc
                       : gon_fail(&e->why, GON_E_DEVICE,
-                                 "laser: says it emits, but the monitor fell to %.4g V from %.4g V; look at "
+                                 "laser: says it emits, but the monitor fell to %.4g V from %.4g "
+                                 "V; look at "
                                  "shutter and monitor, then: gonio resume",
                                  r->monitor_v, e->monitor_lit_v);
     }
-    const char *what = r->flags & STORE_SATURATED ? "saturated on its least sensitive range"
+    const char *what = r->flags & STORE_SATURATED  ? "saturated on its least sensitive range"
                        : r->flags & STORE_UNLOCKED ? "has no reference (chopper stopped?)"
                                                    : "gives no usable reading";
-    return gon_fail(&e->why, GON_E_DEVICE,
-                    "detector: %s at theta_i %.2f deg, theta_r %.2f deg after %d attempts; mend it, "
-                    "then: gonio resume",
-                    what, e->point->theta_i_deg, e->point->theta_r_deg, e->attempt);
+    return gon_fail(
+        &e->why, GON_E_DEVICE,
+        "detector: %s at theta_i %.2f deg, theta_r %.2f deg after %d attempts; mend it, "
+        "then: gonio resume",
+        what, e->point->theta_i_deg, e->point->theta_r_deg, e->attempt);
 }
 
 static double least_monitor_v(const struct engine *e)
 {
     const double dark_v = isfinite(e->monitor_dark_v) ? e->monitor_dark_v : 0.0;
-    return e->point->kind == PLAN_DARK ? (double)NAN : dark_v + MONITOR_LOST * (e->monitor_lit_v - dark_v);
+    return e->point->kind == PLAN_DARK ? (double)NAN
+                                       : dark_v + MONITOR_LOST * (e->monitor_lit_v - dark_v);
 }
 
 static int measure(struct engine *e, const struct travel_pose *at)
@@ -591,13 +420,13 @@ static int do_point(struct engine *e)
     struct travel_pose at;
     if (cancel_requested(e->ports->cancel))
         return canceled(e);
-    if (pause_asked(e))
-        return operator_paused(e);
+    if (engine_pause_asked(e))
+        return engine_operator_paused(e);
     int rc = prepare(e);
     if (rc >= 0)
-        rc = light_for(e);
+        rc = engine_light_for(e);
     if (rc >= 0)
-        rc = watch_laser(e);
+        rc = engine_watch_laser(e);
     if (rc >= 0)
         rc = go_to(e, &at);
     if (rc < 0)
@@ -616,12 +445,13 @@ static void sweep_done(struct engine *e, const struct plan_point *next)
     const struct plan_point *p = e->point;
     if (p->kind != PLAN_SAMPLE || (next && next->sweep == p->sweep))
         return;
-    say(e, ENGINE_SWEEP, "notice", "sweep %d of %d is measured (theta_i %.2f deg)", p->sweep,
-        e->plan->sweeps, p->theta_i_deg);
+    engine_say(e, ENGINE_SWEEP, "notice", "sweep %d of %d is measured (theta_i %.2f deg)", p->sweep,
+               e->plan->sweeps, p->theta_i_deg);
     e->ports->request_fit(e->ports->ctx, p->sweep, false);
 }
 
-// --- the run -----------------------------------------------------------------------------------------
+// --- the run
+// -----------------------------------------------------------------------------------------
 
 static const struct plan_point *next_point(const struct plan *plan, const struct plan_point *after)
 {

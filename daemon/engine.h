@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// The campaign as straight-line code: opens nothing, owns nothing but its own progress. It runs on the
-// instrument thread, or on a test's only thread in virtual time: time, storage, publishing and fitting
-// come through engine_ports, the bench through struct instrument.
+// The campaign as straight-line code: opens nothing, owns nothing but its own progress. It runs on
+// the instrument thread, or on a test's only thread in virtual time: time, storage, publishing and
+// fitting come through engine_ports, the bench through struct instrument.
 //
-//   dark (laser off) -> laser on, warm-up -> beam -> sweeps (a fit is asked for after each) -> beam ->
-//   laser off -> dark -> last fit
+//   dark (laser off) -> laser on, warm-up -> beam -> sweeps (a fit is asked for after each) -> beam
+//   -> laser off -> dark -> last fit
 //
-// The laser is on from warm-up to the last beam reading and off on every way out. A device that is gone
-// or does not answer pauses the run in a safe state (emission off where the laser can be reached, axes
-// stopped) and it goes on by itself once the device is back and identified, from the point in progress;
-// an interlock, a device's fault or a refused command pauses until somebody resumes. Each reading is
-// acknowledged by the store before the next point begins.
+// The laser is on from warm-up to the last beam reading and off on every way out. A device that is
+// gone or does not answer pauses the run in a safe state (emission off where the laser can be
+// reached, axes stopped) and it goes on by itself once the device is back and identified, from the
+// point in progress; an interlock, a device's fault or a refused command pauses until somebody
+// resumes. Each reading is acknowledged by the store before the next point begins.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -43,19 +43,21 @@ enum engine_event_kind { ENGINE_STATE, ENGINE_READING, ENGINE_SWEEP, ENGINE_LOG 
 struct engine_event {
     enum engine_event_kind kind;
     enum run_state state;
-    int sweep, sweeps;          // 1..sweeps; 0 while preparing
-    int point, points;          // within the whole plan: done and all
+    int sweep, sweeps; // 1..sweeps; 0 while preparing
+    int point, points; // within the whole plan: done and all
     double theta_i_deg;
     double theta_r_deg;
-    double f_per_sr;            // provisional value of this reading (opening beam and dark); NAN before there is one
-    double u_per_sr;            // type A
-    unsigned flags;             // of the stored reading
-    double left_s;              // estimate; NAN unknown
+    double f_per_sr; // provisional value of this reading (opening beam and dark); NAN before there
+                     // is one
+    double u_per_sr; // type A
+    unsigned flags;  // of the stored reading
+    double left_s;   // estimate; NAN unknown
     bool emission;
-    const char *text;           // ENGINE_LOG and pauses: one sentence that names the device
+    const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
 
-// Means of the opening reference readings, for provisional f_r after a resume; NAN: not measured yet.
+// Means of the opening reference readings, for provisional f_r after a resume; NAN: not measured
+// yet.
 struct engine_opening {
     double dark_signal_v, dark_monitor_v;
     double beam_signal_v, beam_monitor_v;
@@ -65,19 +67,20 @@ struct engine_opening {
 struct engine_ports {
     void *ctx;
     struct clk *clk;
-    const struct cancel *cancel; // stop: laser off, axes stopped, RUN_STOPPED
+    const struct cancel *cancel;          // stop: laser off, axes stopped, RUN_STOPPED
     const struct engine_opening *opening; // NULL: a new campaign
-    // Returns once the row is committed: 0, or GON_E_STORE (also when there was no acknowledgement for
-    // 10 s), GON_E_CANCELED. After GON_E_STORE emission goes off and the same row is offered again until
-    // it is accepted, so that a row which did arrive must be accepted again when it is the same.
+    // Returns once the row is committed: 0, or GON_E_STORE (also when there was no acknowledgement
+    // for 10 s), GON_E_CANCELED. After GON_E_STORE emission goes off and the same row is offered
+    // again until it is accepted, so that a row which did arrive must be accepted again when it is
+    // the same.
     int (*store_reading)(void *ctx, const struct store_reading *reading, struct gon_error *err);
     int (*store_event)(void *ctx, const char *level, const char *source, const char *text,
                        struct gon_error *err);
     void (*publish)(void *ctx, const struct engine_event *event);
     void (*request_fit)(void *ctx, int sweep, bool last); // does not wait
     bool (*take_resume)(void *ctx); // true once after an operator's "resume"; asked while paused
-    bool (*take_pause)(void *ctx);  // true once after an operator's "pause"; asked between readings and
-                                    // while warming up. NULL: nobody pauses
+    bool (*take_pause)(void *ctx);  // true once after an operator's "pause"; asked between readings
+                                   // and while warming up. NULL: nobody pauses
 };
 
 // Runs the plan from its first point without an accepted reading (the plan carries what is done).

@@ -2,6 +2,7 @@
 #include "daemon/instrument.h"
 
 #include "campaign/bench.h"
+#include "daemon/instrument_inside.h"
 #include "drivers/bus.h"
 
 #include <assert.h>
@@ -15,45 +16,11 @@
 #define BACKOFF_MOST_NS CLK_S(2)
 #define QUIET_MS 100 // the slowest answer of a unit that is to be drained after an error
 
-// The clock that drivers and waits use: its sleeping renews the laser's lease.
-struct breathing {
-    struct clk clk;
-    struct clk *inner;
-    struct instrument *in;
-};
+static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser",
+                                                   "detector"};
 
-struct motor {
-    const struct bench_axis *config;
-    struct axis *axis;
-    int bus; // index; -1: made from ready objects
-    struct axis_place place;
-    int64_t seen_ns;  // when place was read; INT64_MIN: a command was sent since
-    double commanded; // last target sent; NAN: none, or stopped since
-    bool engaged;
-};
-
-struct instrument {
-    const struct bench_config *bench;
-    struct breathing breathing;
-    void (*watcher)(void *ctx);
-    void *watcher_ctx;
-
-    struct part_state part[PART_COUNT];
-    int64_t retry_ns[PART_COUNT], backoff_ns[PART_COUNT];
-
-    struct bus *bus[BENCH_BUSES];
-    struct motor motor[INSTRUMENT_AXES];
-    struct safety *safety;
-    struct laser_status laser;
-    struct detector *detector;
-    int range;
-    double time_constant_s;
-    struct detector_sample sample;
-};
-
-static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser", "detector"};
-
-// --- time -------------------------------------------------------------------------------------------
+// --- time
+// -------------------------------------------------------------------------------------------
 
 static int64_t breathing_now_ns(const struct clk *clk)
 {
@@ -106,10 +73,10 @@ void instrument_watch(struct instrument *in, void (*watcher)(void *ctx), void *c
     in->watcher_ctx = ctx;
 }
 
-// --- links ------------------------------------------------------------------------------------------
+// --- links
+// ------------------------------------------------------------------------------------------
 
-// Keeps the part's book: what came of a call to it. Puts its name before the error's text.
-static int note(struct instrument *in, enum instrument_part part, int rc, struct gon_error *err)
+int instrument_note(struct instrument *in, enum instrument_part part, int rc, struct gon_error *err)
 {
     struct part_state *p = &in->part[part];
     if (rc >= 0) {
@@ -137,13 +104,13 @@ static bool is_part_there(const struct instrument *in, enum instrument_part part
                                   : in->detector != NULL;
 }
 
-// 0 when the part's object exists, so that it can be asked at all.
-static int need(struct instrument *in, enum instrument_part part, struct gon_error *err)
+int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err)
 {
     assert(in->part[part].link != PART_ABSENT);
     if (is_part_there(in, part))
         return 0;
-    return note(in, part, gon_fail(err, GON_E_GONE, "not there (%s)", in->part[part].address), err);
+    return instrument_note(
+        in, part, gon_fail(err, GON_E_GONE, "not there (%s)", in->part[part].address), err);
 }
 
 bool instrument_has(const struct instrument *in, enum instrument_part part)
@@ -164,8 +131,8 @@ static int connect_bus(struct instrument *in, struct motor *m, int unit, struct 
     const struct bench_bus *config = &in->bench->buses[m->bus];
     struct bus **bus = &in->bus[m->bus];
     int rc = *bus ? bus_reopen(*bus, err)
-                  : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL, bus,
-                             err);
+                  : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL,
+                             bus, err);
     if (rc >= 0 && !m->axis && !(m->axis = axis_az_new(*bus, unit)))
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
     return rc;
@@ -206,7 +173,7 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     return safety_begin(in->safety, p->identity, sizeof p->identity, err);
 }
 
-static int set_up_detector(struct instrument *in, struct gon_error *err)
+int instrument_write_set_up(struct instrument *in, struct gon_error *err)
 {
     const struct bench_detector *c = &in->bench->detector;
     const struct detector_setup setup = {c->time_constant_s, c->slope_db, c->monitor_aux};
@@ -217,11 +184,12 @@ static int set_up_detector(struct instrument *in, struct gon_error *err)
 static int connect_detector(struct instrument *in, struct gon_error *err)
 {
     struct part_state *p = &in->part[PART_DETECTOR];
-    int rc = in->detector ? in->detector->ops->reopen(in->detector, err)
-                          : detector_sr830_open(p->address, &in->breathing.clk, NULL, &in->detector, err);
+    int rc = in->detector
+                 ? in->detector->ops->reopen(in->detector, err)
+                 : detector_sr830_open(p->address, &in->breathing.clk, NULL, &in->detector, err);
     if (rc >= 0)
         rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
-    return rc < 0 ? rc : set_up_detector(in, err);
+    return rc < 0 ? rc : instrument_write_set_up(in, err);
 }
 
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err)
@@ -232,7 +200,7 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
     int rc = part < INSTRUMENT_AXES ? connect_axis(in, part, err)
              : part == PART_LASER   ? connect_laser(in, err)
                                     : connect_detector(in, err);
-    rc = note(in, part, rc, err);
+    rc = instrument_note(in, part, rc, err);
     if (rc >= 0)
         return 0;
     // Whatever the reason was: it is not usable, and trying again may help.
@@ -242,7 +210,8 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
     return rc;
 }
 
-// --- construction -----------------------------------------------------------------------------------
+// --- construction
+// -----------------------------------------------------------------------------------
 
 static int find_bus(const struct bench_config *bench, const char *name)
 {
@@ -265,10 +234,14 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     in->sample = (struct detector_sample){NAN, NAN, NAN};
     in->laser = (struct laser_status){.power_w = NAN, .setpoint_w = NAN};
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
-        in->part[part] = (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
+        in->part[part] =
+            (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         struct motor *m = &in->motor[part];
-        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]), .bus = -1, .commanded = NAN, .seen_ns = INT64_MIN,
+        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]),
+                            .bus = -1,
+                            .commanded = NAN,
+                            .seen_ns = INT64_MIN,
                             .place = {.position = NAN, .target = NAN}};
         if (!m->config)
             in->part[part].link = PART_ABSENT;
@@ -277,7 +250,8 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
 }
 
 // The laser first: its first bytes are OFF, and nothing moves before.
-static int hand_over(struct instrument *in, struct instrument **ret_instrument, struct gon_error *err)
+static int hand_over(struct instrument *in, struct instrument **ret_instrument,
+                     struct gon_error *err)
 {
     static const enum instrument_part order[PART_COUNT] = {PART_LASER, PART_THETA_I, PART_THETA_R,
                                                            PART_SAMPLE, PART_DETECTOR};
@@ -286,6 +260,7 @@ static int hand_over(struct instrument *in, struct instrument **ret_instrument, 
         if (!instrument_has(in, order[i]))
             continue;
         int rc = instrument_connect(in, order[i], &own);
+        in->part[order[i]].returns = 0; // it was not away yet
         if (rc == GON_E_INPUT || rc == GON_E_SYSTEM) {
             instrument_free(in);
             return gon_fail(err, (enum gon_code)rc, "%s", own.text);
@@ -295,8 +270,8 @@ static int hand_over(struct instrument *in, struct instrument **ret_instrument, 
     return 0;
 }
 
-int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts, struct clk *clk,
-                   struct instrument **ret_instrument, struct gon_error *err)
+int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts,
+                   struct clk *clk, struct instrument **ret_instrument, struct gon_error *err)
 {
     struct instrument *in = make(bench, clk);
     if (!in)
@@ -314,8 +289,8 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
     return hand_over(in, ret_instrument, err);
 }
 
-int instrument_open(const struct bench_config *bench, struct clk *clk, struct instrument **ret_instrument,
-                    struct gon_error *err)
+int instrument_open(const struct bench_config *bench, struct clk *clk,
+                    struct instrument **ret_instrument, struct gon_error *err)
 {
     struct gon_error own;
     err = err ? err : &own;
@@ -383,7 +358,8 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
     }
 }
 
-// --- an instrument that runs nothing -----------------------------------------------------------------
+// --- an instrument that runs nothing
+// -----------------------------------------------------------------
 
 static void ask(struct instrument *in, enum instrument_part part)
 {
@@ -394,8 +370,8 @@ static void ask(struct instrument *in, enum instrument_part part)
         instrument_place(in, part, &place, NULL);
     else if (part == PART_DETECTOR)
         instrument_sample(in, &sample, NULL);
-    else if (safety_pending(in->safety) ||
-             (instrument_laser(in, &laser, NULL) >= 0 && laser.emission && !safety_emission(in->safety)))
+    else if (safety_pending(in->safety) || (instrument_laser(in, &laser, NULL) >= 0 &&
+                                            laser.emission && !safety_emission(in->safety)))
         instrument_emission_off(in, NULL);
 }
 
@@ -428,260 +404,4 @@ int instrument_tend(struct instrument *in)
         if (in->part[part].link == PART_OK)
             ask(in, part);
     return instrument_reconnect(in);
-}
-
-// --- axes ---------------------------------------------------------------------------------------------
-
-const struct bench_axis *instrument_axis(const struct instrument *in, enum instrument_part part)
-{
-    return in->motor[part].config;
-}
-
-static int32_t to_steps(const struct bench_axis *c, double position)
-{
-    return (int32_t)lround((position - c->zero) * c->steps_per_unit);
-}
-
-static double of_steps(const struct bench_axis *c, int32_t steps)
-{
-    return steps / c->steps_per_unit + c->zero;
-}
-
-double instrument_rounded(const struct instrument *in, enum instrument_part part, double position)
-{
-    const struct bench_axis *c = in->motor[part].config;
-    return of_steps(c, to_steps(c, position));
-}
-
-bool instrument_engaged(const struct instrument *in, enum instrument_part part)
-{
-    return in->motor[part].engaged;
-}
-
-int instrument_place(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
-                     struct gon_error *err)
-{
-    struct motor *m = &in->motor[part];
-    struct gon_error own;
-    struct axis_status s;
-    err = err ? err : &own;
-    int rc = need(in, part, err);
-    if (rc < 0)
-        return rc;
-    rc = note(in, part, m->axis->ops->status(m->axis, &s, err), err);
-    if (rc < 0)
-        return rc;
-    m->place = (struct axis_place){
-        .position = of_steps(m->config, s.position_steps),
-        .target = m->commanded,
-        .moving = s.moving,
-        .in_position = s.in_position,
-        .ready = s.ready,
-        .homed = s.homed,
-        .alarm = s.alarm,
-        .alarm_code = s.alarm_code,
-        .alarm_text = s.alarm ? m->axis->ops->alarm_text(s.alarm_code) : "",
-    };
-    m->seen_ns = instrument_now_ns(in);
-    *ret_place = m->place;
-    return 0;
-}
-
-int instrument_place_recent(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
-                            struct gon_error *err)
-{
-    const struct motor *m = &in->motor[part];
-    const struct axis_place *p = &m->place;
-    const bool stands = !p->moving && p->in_position && p->ready && p->homed && !p->alarm;
-    if (!stands || m->seen_ns == INT64_MIN ||
-        instrument_now_ns(in) - m->seen_ns > CLK_MS(INSTRUMENT_FRESH_MS))
-        return instrument_place(in, part, ret_place, err);
-    *ret_place = *p;
-    return 0;
-}
-
-int instrument_go(struct instrument *in, enum instrument_part part, double position, struct gon_error *err)
-{
-    struct motor *m = &in->motor[part];
-    const struct bench_axis *c = m->config;
-    struct gon_error own;
-    err = err ? err : &own;
-    if (!(position >= c->min - 1e-9 && position <= c->max + 1e-9))
-        return gon_fail(err, GON_E_INPUT, "axis %s: %.4f %s is outside its travel %g..%g %s", c->name,
-                        position, c->unit_name, c->min, c->max, c->unit_name);
-    int rc = need(in, part, err);
-    if (rc < 0)
-        return rc;
-    const double rise = position - m->place.position;
-    m->commanded = instrument_rounded(in, part, position);
-    m->seen_ns = INT64_MIN;
-    if (c->backlash > 0)
-        m->engaged = rise >= 0 && (m->engaged || rise >= c->backlash);
-    rc = m->axis->ops->move_abs(m->axis, to_steps(c, position),
-                                (int32_t)lround(fabs(c->speed * c->steps_per_unit)),
-                                (int32_t)lround(fabs(c->acceleration * c->steps_per_unit)), err);
-    return note(in, part, rc, err);
-}
-
-static int command(struct instrument *in, enum instrument_part part,
-                   int (*call)(struct axis *a, struct gon_error *err), struct gon_error *err)
-{
-    struct motor *m = &in->motor[part];
-    m->engaged = m->config->backlash <= 0;
-    m->commanded = NAN;
-    m->seen_ns = INT64_MIN;
-    return note(in, part, call(m->axis, err), err);
-}
-
-int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, part, err);
-    return rc < 0 ? rc : command(in, part, in->motor[part].axis->ops->home, err);
-}
-
-int instrument_halt(struct instrument *in, enum instrument_part part, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, part, err);
-    return rc < 0 ? rc : command(in, part, in->motor[part].axis->ops->stop, err);
-}
-
-// --- laser --------------------------------------------------------------------------------------------
-
-int instrument_laser(struct instrument *in, struct laser_status *ret_status, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_LASER, err);
-    if (rc >= 0)
-        rc = note(in, PART_LASER, safety_status(in->safety, &in->laser, err), err);
-    if (rc >= 0)
-        *ret_status = in->laser;
-    return rc;
-}
-
-int instrument_light(struct instrument *in, bool *ret_emission, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_LASER, err);
-    if (rc >= 0)
-        rc = note(in, PART_LASER, safety_look(in->safety, &in->laser.emission, err), err);
-    if (rc >= 0)
-        *ret_emission = in->laser.emission;
-    return rc;
-}
-
-int instrument_power(struct instrument *in, double power_w, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_LASER, err);
-    return rc < 0 ? rc : note(in, PART_LASER, safety_set_power(in->safety, power_w, err), err);
-}
-
-int instrument_emission_on(struct instrument *in, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_LASER, err);
-    return rc < 0 ? rc : note(in, PART_LASER, safety_on(in->safety, err), err);
-}
-
-int instrument_emission_off(struct instrument *in, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_LASER, err);
-    if (rc < 0)
-        return rc;
-    rc = note(in, PART_LASER, safety_off(in->safety, err), err);
-    if (rc >= 0)
-        in->laser.emission = false;
-    return rc;
-}
-
-void instrument_permit(struct instrument *in, bool running)
-{
-    if (in->safety)
-        safety_permit(in->safety, running);
-}
-
-bool instrument_emission(const struct instrument *in)
-{
-    return in->safety && safety_emission(in->safety);
-}
-
-const struct safety *instrument_safety(const struct instrument *in)
-{
-    return in->safety;
-}
-
-// --- detector -----------------------------------------------------------------------------------------
-
-int instrument_ranges(const struct instrument *in)
-{
-    return in->detector ? in->detector->ops->ranges(in->detector) : 0;
-}
-
-double instrument_full_scale_v(const struct instrument *in, int range)
-{
-    return in->detector->ops->full_scale_v(in->detector, range);
-}
-
-int instrument_range(const struct instrument *in)
-{
-    return in->range;
-}
-
-int instrument_set_up(struct instrument *in, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_DETECTOR, err);
-    return rc < 0 ? rc : note(in, PART_DETECTOR, set_up_detector(in, err), err);
-}
-
-int instrument_set_range(struct instrument *in, int range, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_DETECTOR, err);
-    if (rc < 0)
-        return rc;
-    in->range = -1;
-    rc = note(in, PART_DETECTOR, in->detector->ops->set_range(in->detector, range, err), err);
-    if (rc >= 0)
-        in->range = range;
-    return rc;
-}
-
-int instrument_sample(struct instrument *in, struct detector_sample *ret_sample, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_DETECTOR, err);
-    if (rc >= 0)
-        rc = note(in, PART_DETECTOR, in->detector->ops->sample(in->detector, &in->sample, err), err);
-    if (rc >= 0)
-        *ret_sample = in->sample;
-    return rc;
-}
-
-int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err)
-{
-    struct gon_error own;
-    err = err ? err : &own;
-    int rc = need(in, PART_DETECTOR, err);
-    return rc < 0 ? rc
-                  : note(in, PART_DETECTOR,
-                         in->detector->ops->condition(in->detector, ret_flags, err), err);
-}
-
-double instrument_time_constant_s(const struct instrument *in)
-{
-    return in->time_constant_s;
 }

@@ -3,10 +3,10 @@
 // configuration and kept open. Each part's link state, last values and errors are remembered for
 // `gonio status`. Thread: instrument; others see copies of struct instrument_snapshot.
 //
-// A part that is not there when the bench is opened, or that goes away, is "lost": calls to it fail with
-// GON_E_GONE or GON_E_LINK and its name in front ("axis theta_r: ..."), and instrument_connect brings it
-// back. Errors that name a device name it once. The drivers get no cancel token: whatever ends a run
-// must still reach the laser and the axes; their own time limits bound each call.
+// A part that is not there when the bench is opened, or that goes away, is "lost": calls to it fail
+// with GON_E_GONE or GON_E_LINK and its name in front ("axis theta_r: ..."), and instrument_connect
+// brings it back. Errors that name a device name it once. The drivers get no cancel token: whatever
+// ends a run must still reach the laser and the axes; their own time limits bound each call.
 //
 // Every wait goes through instrument_wait, in slices of at most 100 ms that renew the laser's lease
 // (safety_tick) and call the watcher. Drivers are given a clock whose sleeping does the same.
@@ -39,13 +39,13 @@ enum instrument_part {
 enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 
 struct part_state {
-    const char *name;      // "theta_i", "theta_r", "sample", "laser", "detector"
-    enum part_link link;   // PART_ABSENT: the bench has none
-    const char *address;   // of its link; "" when made from ready objects
-    char identity[96];     // what it said it is
-    char problem[240];     // why it is lost; "" when it is not
-    uint64_t errors;       // failed calls since the start
-    uint64_t returns;      // times it came back
+    const char *name;    // "theta_i", "theta_r", "sample", "laser", "detector"
+    enum part_link link; // PART_ABSENT: the bench has none
+    const char *address; // of its link; "" when made from ready objects
+    char identity[96];   // what it said it is
+    char problem[240];   // why it is lost; "" when it is not
+    uint64_t errors;     // failed calls since the start
+    uint64_t returns;    // times it came back
 };
 
 // Everything that is known of the bench, as of the last time each part was asked.
@@ -58,17 +58,17 @@ struct instrument_snapshot {
         bool moving, homed, alarm;
         int alarm_code;
     } axis[INSTRUMENT_AXES];
-    struct laser_status laser;   // as last read
-    bool emission;               // commanded on and not read back off: what is to be assumed
-    bool off_unconfirmed;        // LASER MAY BE ON
-    int range;                   // of the detector; -1: not known
+    struct laser_status laser; // as last read
+    bool emission;             // commanded on and not read back off: what is to be assumed
+    bool off_unconfirmed;      // LASER MAY BE ON
+    int range;                 // of the detector; -1: not known
     double full_scale_v;
-    double signal_v, monitor_v;  // last sample; NAN: none
-    double time_constant_s;      // as the device has it
+    double signal_v, monitor_v; // last sample; NAN: none
+    double time_constant_s;     // as the device has it
 };
 
-// Objects that exist already, for tests and simulations; taken over, each may be NULL but not laser and
-// detector. Reopening an axis is then its identify.
+// Objects that exist already, for tests and simulations; taken over, each may be NULL but not laser
+// and detector. Reopening an axis is then its identify.
 struct instrument_parts {
     struct axis *axis[INSTRUMENT_AXES];
     struct laser *laser;
@@ -77,16 +77,17 @@ struct instrument_parts {
 
 // Opens what is there; what is not is lost, which is no error. GON_E_INPUT: a link's text is wrong;
 // GON_E_SYSTEM. The bench is borrowed for the object's life.
-int instrument_open(const struct bench_config *bench, struct clk *clk, struct instrument **ret_instrument,
-                    struct gon_error *err);
-int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts, struct clk *clk,
-                   struct instrument **ret_instrument, struct gon_error *err);
+int instrument_open(const struct bench_config *bench, struct clk *clk,
+                    struct instrument **ret_instrument, struct gon_error *err);
+int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts,
+                   struct clk *clk, struct instrument **ret_instrument, struct gon_error *err);
 void instrument_free(struct instrument *in); // laser off and axes stopped first
 
 const struct bench_config *instrument_bench(const struct instrument *in);
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot);
-// Called between slices of every wait, on the instrument thread: at most 100 ms apart while the engine
-// waits. It must be quick and must not call back into the instrument, except instrument_snapshot.
+// Called between slices of every wait, on the instrument thread: at most 100 ms apart while the
+// engine waits. It must be quick and must not call back into the instrument, except
+// instrument_snapshot.
 void instrument_watch(struct instrument *in, void (*watcher)(void *ctx), void *ctx);
 int instrument_wait(struct instrument *in, int64_t until_ns, const struct cancel *cancel);
 // For waits elsewhere on the instrument thread (the store's acknowledgement): what a slice does. At
@@ -95,14 +96,14 @@ void instrument_breathe(struct instrument *in);
 int64_t instrument_now_ns(const struct instrument *in);
 int64_t instrument_utc_ns(const struct instrument *in);
 
-// For an instrument that runs nothing, about once a second: asks every part that is there how it is and
-// tries once to bring back one that is lost (paced, 0.2 to 2 s). Repeats an unconfirmed off. Returns the
-// number of parts lost. instrument_reconnect is the second half alone.
+// For an instrument that runs nothing, about once a second: asks every part that is there how it is
+// and tries once to bring back one that is lost (paced, 0.2 to 2 s). Repeats an unconfirmed off.
+// Returns the number of parts lost. instrument_reconnect is the second half alone.
 int instrument_tend(struct instrument *in);
 int instrument_reconnect(struct instrument *in);
 
-// A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off, an
-// axis stopped, a detector set up as configured. 0 when it is there.
+// A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off,
+// an axis stopped, a detector set up as configured. 0 when it is there.
 enum instrument_part instrument_lost(const struct instrument *in);
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_has(const struct instrument *in, enum instrument_part part);
@@ -120,21 +121,24 @@ struct axis_place {
 const struct bench_axis *instrument_axis(const struct instrument *in, enum instrument_part part);
 int instrument_place(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
                      struct gon_error *err);
-// The same from memory, when the axis was seen standing at its target at most INSTRUMENT_FRESH_MS ago and
-// told nothing since; otherwise asks. Each question costs some ms on a serial line.
-int instrument_place_recent(struct instrument *in, enum instrument_part part, struct axis_place *ret_place,
-                            struct gon_error *err);
+// The same from memory, when the axis was seen standing at its target at most INSTRUMENT_FRESH_MS
+// ago and told nothing since; otherwise asks. Each question costs some ms on a serial line.
+int instrument_place_recent(struct instrument *in, enum instrument_part part,
+                            struct axis_place *ret_place, struct gon_error *err);
 // Checks travel limits (GON_E_INPUT), then commands once. GON_E_LINK: it may have been carried out.
-int instrument_go(struct instrument *in, enum instrument_part part, double position, struct gon_error *err);
+int instrument_go(struct instrument *in, enum instrument_part part, double position,
+                  struct gon_error *err);
 int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err);
 int instrument_halt(struct instrument *in, enum instrument_part part, struct gon_error *err);
-// Whether the last moves took up the play so that the load is where the encoder says: it went up by at
-// least the backlash since it last went down, was stopped or was homed. Always true without backlash.
+// Whether the last moves took up the play so that the load is where the encoder says: it went up by
+// at least the backlash since it last went down, was stopped or was homed. Always true without
+// backlash.
 bool instrument_engaged(const struct instrument *in, enum instrument_part part);
 // The position nearest to the one asked that is a whole number of steps.
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position);
 
-// --- laser: as safety.h, with the part's link kept ------------------------------------------------
+// --- laser: as safety.h, with the part's link kept
+// ------------------------------------------------
 int instrument_laser(struct instrument *in, struct laser_status *ret_status, struct gon_error *err);
 // One short question: whether it says that light comes out.
 int instrument_light(struct instrument *in, bool *ret_emission, struct gon_error *err);
@@ -145,13 +149,15 @@ void instrument_permit(struct instrument *in, bool running);
 bool instrument_emission(const struct instrument *in);
 const struct safety *instrument_safety(const struct instrument *in);
 
-// --- detector ---------------------------------------------------------------------------------------
+// --- detector
+// ---------------------------------------------------------------------------------------
 int instrument_ranges(const struct instrument *in);
 double instrument_full_scale_v(const struct instrument *in, int range);
 int instrument_range(const struct instrument *in); // -1: not known
 // The configured time constant and slope, written and read back; the range is not known afterwards.
 int instrument_set_up(struct instrument *in, struct gon_error *err);
 int instrument_set_range(struct instrument *in, int range, struct gon_error *err);
-int instrument_sample(struct instrument *in, struct detector_sample *ret_sample, struct gon_error *err);
+int instrument_sample(struct instrument *in, struct detector_sample *ret_sample,
+                      struct gon_error *err);
 int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err);
 double instrument_time_constant_s(const struct instrument *in); // as the device has it

@@ -70,8 +70,7 @@ static int check_may_emit(struct safety *s, struct gon_error *err)
     if (rc < 0)
         return rc;
     if (!now.interlock_closed || now.state == LASER_INTERLOCK)
-        return gon_fail(err, GON_E_REFUSED,
-                        "the interlock is open; close it, then: gonio resume");
+        return gon_fail(err, GON_E_REFUSED, "the interlock is open; close it, then: gonio resume");
     if (now.state == LASER_NEEDS_KEY)
         return gon_fail(err, GON_E_REFUSED,
                         "wants its key switch turned off and on, then: gonio resume");

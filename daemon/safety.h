@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The one place that commands emission. It takes the laser over, so that nobody else can: there is no
-// other way to it than these calls. Thread: instrument.
+// The one place that commands emission. It takes the laser over, so that nobody else can: there is
+// no other way to it than these calls. Thread: instrument.
 //
-//  - before anything else is sent to a laser it is switched off and that is read back (safety_begin);
+//  - before anything else is sent to a laser it is switched off and that is read back
+//  (safety_begin);
 //  - on only while a run has permission (safety_permit) and the interlock reads closed; sent once;
 //  - off is sent until it was read back, at most for SAFETY_OFF_S; when that fails the answer is
-//    GON_E_DEVICE and "LASER MAY BE ON", and the rule "off" stays in force: every later tick of an idle
-//    instrument tries again (safety_pending);
-//  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms. Today
+//    GON_E_DEVICE and "LASER MAY BE ON", and the rule "off" stays in force: every later tick of an
+//    idle instrument tries again (safety_pending);
+//  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms.
+//  Today
 //    the longest gap is only measured; the guard process that holds the port will act on it.
 #pragma once
 #include "base/clk.h"
@@ -20,22 +22,25 @@
 
 struct safety;
 
-#define SAFETY_OFF_S 5.0           // how long one safety_off tries
-#define SAFETY_TICK_MOST_MS 200.0  // the longest silence allowed while emission is on
+#define SAFETY_OFF_S 5.0          // how long one safety_off tries
+#define SAFETY_TICK_MOST_MS 200.0 // the longest silence allowed while emission is on
 
 // Takes over laser, also when it fails (then the laser is freed). NULL without memory.
 struct safety *safety_new(struct laser *laser, struct clk *clk);
 void safety_free(struct safety *s); // off first, as well as the link allows
 
-// First contact, and after every reopening: off with read back, then who it is. ret_text may be NULL.
+// First contact, and after every reopening: off with read back, then who it is. ret_text may be
+// NULL.
 int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error *err);
 // One try at the link, then safety_begin.
 int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_error *err);
 
-void safety_permit(struct safety *s, bool running); // a run begins or ends; ending sends nothing itself
+void safety_permit(struct safety *s,
+                   bool running); // a run begins or ends; ending sends nothing itself
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err);
 
-// GON_E_REFUSED: no running campaign, interlock open, key; GON_E_DEVICE: fault. Accepted is not light.
+// GON_E_REFUSED: no running campaign, interlock open, key; GON_E_DEVICE: fault. Accepted is not
+// light.
 int safety_on(struct safety *s, struct gon_error *err);
 int safety_off(struct safety *s, struct gon_error *err);
 
@@ -46,6 +51,6 @@ int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_
 int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err);
 const char *safety_fault_text(const struct safety *s, int code);
 
-bool safety_emission(const struct safety *s);         // on was sent and off was not read back since
-bool safety_pending(const struct safety *s);          // an off that was not confirmed
-int64_t safety_worst_gap_ns(const struct safety *s);  // between ticks, while emission was on
+bool safety_emission(const struct safety *s);        // on was sent and off was not read back since
+bool safety_pending(const struct safety *s);         // an off that was not confirmed
+int64_t safety_worst_gap_ns(const struct safety *s); // between ticks, while emission was on

@@ -7,11 +7,12 @@
 #include <string.h>
 
 #define RESEEKS_MOST 2
-#define LOOK_NS CLK_MS(250)    // while waiting for the predicted arrival: for alarms
-#define HALT_NS CLK_S(2)       // a stop that takes longer is a fault
+#define LOOK_NS CLK_MS(250) // while waiting for the predicted arrival: for alarms
+#define HALT_NS CLK_S(2)    // a stop that takes longer is a fault
 #define HOME_LEAST_S 120.0
 
-// One axis on its way: below the target first when there is backlash to take up, then to the target.
+// One axis on its way: below the target first when there is backlash to take up, then to the
+// target.
 struct leg {
     enum instrument_part part;
     double target, to;
@@ -52,7 +53,8 @@ static int check(const struct instrument *in, enum instrument_part part, const s
     return 0;
 }
 
-// Sends the leg's command once. When its answer is lost the waiting below finds out what became of it.
+// Sends the leg's command once. When its answer is lost the waiting below finds out what became of
+// it.
 static int start_leg(struct instrument *in, struct leg *t, double from, struct gon_error *err)
 {
     const struct bench_axis *axis = instrument_axis(in, t->part);
@@ -70,7 +72,8 @@ static int start_leg(struct instrument *in, struct leg *t, double from, struct g
 }
 
 static int halt_and_wait(struct instrument *in, enum instrument_part part,
-                         const struct cancel *cancel, struct axis_place *place, struct gon_error *err)
+                         const struct cancel *cancel, struct axis_place *place,
+                         struct gon_error *err)
 {
     const int64_t until_ns = instrument_now_ns(in) + HALT_NS;
     int rc = instrument_halt(in, part, err);
@@ -112,8 +115,8 @@ static int set_out(struct instrument *in, struct leg *t, const struct cancel *ca
 
     const double half_step = 0.5 / fabs(axis->steps_per_unit);
     t->target = instrument_rounded(in, t->part, t->target);
-    if (fabs(p.position - t->target) <= tolerance(axis) &&
-        fabs(p.target - t->target) < half_step && instrument_engaged(in, t->part)) {
+    if (fabs(p.position - t->target) <= tolerance(axis) && fabs(p.target - t->target) < half_step &&
+        instrument_engaged(in, t->part)) {
         t->done = true;
         return 0;
     }
@@ -155,17 +158,17 @@ static int look(struct instrument *in, struct leg *t, struct gon_error *err)
     }
     // It stands somewhere else: the command was lost, or it missed. Standing, it may be told again.
     if (t->reseeks++ >= RESEEKS_MOST)
-        return gon_fail(err, GON_E_DEVICE,
-                        "axis %s: stands at %.4f %s instead of %.4f (deadband %.4f) after %d tries; "
-                        "look for a slipping or blocked axis, then: gonio resume",
-                        axis->name, p.position, axis->unit_name, t->to, axis->deadband,
-                        1 + RESEEKS_MOST);
+        return gon_fail(
+            err, GON_E_DEVICE,
+            "axis %s: stands at %.4f %s instead of %.4f (deadband %.4f) after %d tries; "
+            "look for a slipping or blocked axis, then: gonio resume",
+            axis->name, p.position, axis->unit_name, t->to, axis->deadband, 1 + RESEEKS_MOST);
     choose_leg(in, t, p.position);
     return start_leg(in, t, p.position, err);
 }
 
 static int ride_all(struct instrument *in, struct leg *t, const struct cancel *cancel,
-                      struct gon_error *err)
+                    struct gon_error *err)
 {
     for (;;) {
         int64_t next_ns = INT64_MAX;
@@ -187,8 +190,8 @@ static int ride_all(struct instrument *in, struct leg *t, const struct cancel *c
 }
 
 // Encoders of all axes, also of those that were not to move: an axis that strays is noticed here.
-static int where(struct instrument *in, const struct travel_pose *target, struct travel_pose *ret_pose,
-                 struct gon_error *err)
+static int where(struct instrument *in, const struct travel_pose *target,
+                 struct travel_pose *ret_pose, struct gon_error *err)
 {
     struct travel_pose pose = {.still_ns = instrument_now_ns(in)};
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
@@ -200,7 +203,8 @@ static int where(struct instrument *in, const struct travel_pose *target, struct
             if (rc < 0)
                 return rc;
             const struct bench_axis *axis = instrument_axis(in, part);
-            if (!isnan(target->at[part]) && fabs(p.position - target->at[part]) > 2.0 * tolerance(axis))
+            if (!isnan(target->at[part]) &&
+                fabs(p.position - target->at[part]) > 2.0 * tolerance(axis))
                 return gon_fail(err, GON_E_DEVICE,
                                 "axis %s: moved by itself from %.4f to %.4f %s; look at it, then: "
                                 "gonio resume",
@@ -212,8 +216,8 @@ static int where(struct instrument *in, const struct travel_pose *target, struct
     return 0;
 }
 
-int travel_move(struct instrument *in, const struct travel_pose *target, const struct cancel *cancel,
-                struct travel_pose *ret_actual, struct gon_error *err)
+int travel_move(struct instrument *in, const struct travel_pose *target,
+                const struct cancel *cancel, struct travel_pose *ret_actual, struct gon_error *err)
 {
     struct leg t[INSTRUMENT_AXES];
     int rc = cancel_requested(cancel) ? gon_fail(err, GON_E_CANCELED, "stopped before moving") : 0;
@@ -237,7 +241,8 @@ int travel_station(const struct instrument *in, const char *name, struct travel_
 {
     const struct bench_station *s = bench_find_station(instrument_bench(in), name);
     if (!s)
-        return gon_fail(err, GON_E_INPUT, "the bench has no station \"%s\": add it to stations", name);
+        return gon_fail(err, GON_E_INPUT, "the bench has no station \"%s\": add it to stations",
+                        name);
     *ret_pose = (struct travel_pose){.at = {s->theta_i_deg, s->theta_r_deg, s->sample_mm}};
     return 0;
 }

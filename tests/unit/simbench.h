@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The simulated world behind the drivers' contracts, in one process and in virtual time: axes, laser and
-// detector that cost nothing to ask. Every call of theirs counts, and one call can be made to fail.
+// The simulated world behind the drivers' contracts, in one process and in virtual time: axes,
+// laser and detector that cost nothing to ask. Every call of theirs counts, and one call can be
+// made to fail.
 #pragma once
 #include "base/clk.h"
 #include "daemon/instrument.h"
@@ -26,9 +27,9 @@ struct simbench_axis {
     int32_t target_steps;
     bool homed, homing;
     int alarm;
-    int misses;          // the next moves end this number of times somewhere else
-    bool frozen;         // never done
-    bool swallow;        // the next command is lost with its answer
+    int misses;   // the next moves end this number of times somewhere else
+    bool frozen;  // never done
+    bool swallow; // the next command is lost with its answer
     int moves, stops;
 };
 
@@ -39,7 +40,7 @@ struct simbench {
     struct laser laser;
     struct detector detector;
     int range;
-    double step_delay_s;  // virtual time each call costs
+    double step_delay_s; // virtual time each call costs
 
     // faults: the fail_at-th call from now on fails; or one call of a device
     long calls, fail_at;
@@ -65,9 +66,10 @@ static inline int64_t simbench_now_ns(struct simbench *b)
     return b->clk.t_ns;
 }
 
-// 0, or the failure that this call has; *ret_carried_out says whether the device did what was asked.
-static inline int simbench_call(struct simbench *b, enum simbench_device device, bool *ret_carried_out,
-                                struct gon_error *err)
+// 0, or the failure that this call has; *ret_carried_out says whether the device did what was
+// asked.
+static inline int simbench_call(struct simbench *b, enum simbench_device device,
+                                bool *ret_carried_out, struct gon_error *err)
 {
     const int64_t now_ns = simbench_now_ns(b);
     *ret_carried_out = true;
@@ -95,7 +97,8 @@ static inline int simbench_axis_identify(struct axis *a, struct gon_error *err)
     return simbench_call(s->bench, SIMBENCH_AXES, &done, err);
 }
 
-static inline int simbench_axis_status(struct axis *a, struct axis_status *ret, struct gon_error *err)
+static inline int simbench_axis_status(struct axis *a, struct axis_status *ret,
+                                       struct gon_error *err)
 {
     struct simbench_axis *s = (struct simbench_axis *)a;
     bool done;
@@ -119,8 +122,8 @@ static inline int simbench_axis_status(struct axis *a, struct axis_status *ret, 
     return 0;
 }
 
-static inline int simbench_axis_move(struct axis *a, int32_t position, int32_t speed, int32_t acceleration,
-                                     struct gon_error *err)
+static inline int simbench_axis_move(struct axis *a, int32_t position, int32_t speed,
+                                     int32_t acceleration, struct gon_error *err)
 {
     struct simbench_axis *s = (struct simbench_axis *)a;
     struct simbench *b = s->bench;
@@ -139,8 +142,8 @@ static inline int simbench_axis_move(struct axis *a, int32_t position, int32_t s
         s->misses--;
         to += 0.05;
     }
-    motion_go(&b->world.axis[s->which], to, speed / s->steps_per_unit, acceleration / s->steps_per_unit,
-              acceleration / s->steps_per_unit, b->clk.t_ns);
+    motion_go(&b->world.axis[s->which], to, speed / s->steps_per_unit,
+              acceleration / s->steps_per_unit, acceleration / s->steps_per_unit, b->clk.t_ns);
     return rc;
 }
 
@@ -194,7 +197,8 @@ static inline struct simbench *simbench_of_laser(struct laser *l)
     return (struct simbench *)((char *)l - offsetof(struct simbench, laser));
 }
 
-static inline int simbench_laser_identify(struct laser *l, char *text, size_t size, struct gon_error *err)
+static inline int simbench_laser_identify(struct laser *l, char *text, size_t size,
+                                          struct gon_error *err)
 {
     bool done;
     int rc = simbench_call(simbench_of_laser(l), SIMBENCH_LASER, &done, err);
@@ -203,7 +207,8 @@ static inline int simbench_laser_identify(struct laser *l, char *text, size_t si
     return rc;
 }
 
-static inline int simbench_laser_status(struct laser *l, struct laser_status *ret, struct gon_error *err)
+static inline int simbench_laser_status(struct laser *l, struct laser_status *ret,
+                                        struct gon_error *err)
 {
     struct simbench *b = simbench_of_laser(l);
     bool done;
@@ -358,11 +363,13 @@ static inline int simbench_detector_sample(struct detector *d, struct detector_s
         b->nonsense--;
         return gon_fail(err, GON_E_LINK, "answered \"nan\"");
     }
-    *ret = (struct detector_sample){lockin_x_v(&b->world.lockin), world_aux_v(&b->world, 1), 1000.0};
+    *ret =
+        (struct detector_sample){lockin_x_v(&b->world.lockin), world_aux_v(&b->world, 1), 1000.0};
     return 0;
 }
 
-static inline int simbench_detector_condition(struct detector *d, unsigned *ret, struct gon_error *err)
+static inline int simbench_detector_condition(struct detector *d, unsigned *ret,
+                                              struct gon_error *err)
 {
     struct simbench *b = simbench_of_detector(d);
     bool done;
@@ -395,27 +402,35 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
     static const struct axis_ops axis_ops = {
         simbench_axis_identify, simbench_axis_status, simbench_axis_move,  simbench_axis_stop,
         simbench_axis_home,     simbench_axis_reset,  simbench_alarm_text, simbench_axis_free};
-    static const struct laser_ops laser_ops = {
-        .identify = simbench_laser_identify, .status = simbench_laser_status,
-        .emission = simbench_laser_emission, .set_power = simbench_laser_power,   .on = simbench_laser_on,
-        .off = simbench_laser_off,           .reopen = simbench_laser_reopen,
-        .fault_text = simbench_fault_text,   .free = simbench_laser_free};
-    static const struct detector_ops detector_ops = {
-        .identify = simbench_detector_identify,   .setup = simbench_detector_setup,
-        .ranges = simbench_detector_ranges,       .full_scale_v = simbench_full_scale_v,
-        .set_range = simbench_detector_set_range, .sample = simbench_detector_sample,
-        .condition = simbench_detector_condition, .reopen = simbench_detector_reopen,
-        .free = simbench_detector_free};
+    static const struct laser_ops laser_ops = {.identify = simbench_laser_identify,
+                                               .status = simbench_laser_status,
+                                               .emission = simbench_laser_emission,
+                                               .set_power = simbench_laser_power,
+                                               .on = simbench_laser_on,
+                                               .off = simbench_laser_off,
+                                               .reopen = simbench_laser_reopen,
+                                               .fault_text = simbench_fault_text,
+                                               .free = simbench_laser_free};
+    static const struct detector_ops detector_ops = {.identify = simbench_detector_identify,
+                                                     .setup = simbench_detector_setup,
+                                                     .ranges = simbench_detector_ranges,
+                                                     .full_scale_v = simbench_full_scale_v,
+                                                     .set_range = simbench_detector_set_range,
+                                                     .sample = simbench_detector_sample,
+                                                     .condition = simbench_detector_condition,
+                                                     .reopen = simbench_detector_reopen,
+                                                     .free = simbench_detector_free};
     struct world_spec spec;
-    *b = (struct simbench){.laser = {&laser_ops}, .detector = {&detector_ops}, .gone_for_ns = CLK_S(3)};
+    *b = (struct simbench){
+        .laser = {&laser_ops}, .detector = {&detector_ops}, .gone_for_ns = CLK_S(3)};
     clk_virtual_init(&b->clk, CLK_S(1), CLK_S(1700000000));
     world_defaults(&spec);
     if (tune)
         tune(&spec);
     world_init(&b->world, &spec, b->clk.t_ns);
     for (int i = 0; i < INSTRUMENT_AXES; i++)
-        b->axis[i] = (struct simbench_axis){.axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i,
-                                            .steps_per_unit = 1000.0};
+        b->axis[i] = (struct simbench_axis){
+            .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
 }
 
 static inline struct instrument_parts simbench_parts(struct simbench *b)

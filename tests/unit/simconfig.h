@@ -6,11 +6,16 @@
 #include <stdio.h>
 #include <string.h>
 
-static inline void simconfig_axis(struct bench_axis *a, const char *name, const char *unit, double min,
-                                  double max)
+static inline void simconfig_axis(struct bench_axis *a, const char *name, const char *unit,
+                                  double min, double max)
 {
-    *a = (struct bench_axis){.steps_per_unit = 1000, .min = min, .max = max, .speed = 20,
-                             .acceleration = 60, .backlash = 0.02, .deadband = 0.003};
+    *a = (struct bench_axis){.steps_per_unit = 1000,
+                             .min = min,
+                             .max = max,
+                             .speed = 20,
+                             .acceleration = 60,
+                             .backlash = 0.02,
+                             .deadband = 0.003};
     snprintf(a->name, sizeof a->name, "%s", name);
     snprintf(a->unit_name, sizeof a->unit_name, "%s", unit);
 }

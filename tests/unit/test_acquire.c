@@ -143,8 +143,8 @@ static void a_signal_far_below_the_range_is_read_again_further_down(void **state
     const double full_v = simbench_full_scale_v(NULL, r.range);
     assert_true(r.signal_v > ACQUIRE_POOR * full_v && r.signal_v < 0.95 * full_v);
     const struct optics_spec *o = &s->b.world.spec.optics;
-    const double truth_v =
-        2e-7 + 16 * 0.05 * optics_f_per_sr(o, 30, 30) * optics_solid_angle_sr(o) * cos(UNITS_PI / 6);
+    const double truth_v = 2e-7 + 16 * 0.05 * optics_f_per_sr(o, 30, 30) *
+                                      optics_solid_angle_sr(o) * cos(UNITS_PI / 6);
     assert_true(fabs(r.signal_v / truth_v - 1) < 3e-4); // settling 1e-4; noise of the mean 3e-5
     assert_int_equal(r.count, 4);
     assert_true(r.signal_sd_v > 0 && r.signal_sd_v < 5 * 4.5e-9);
@@ -159,7 +159,8 @@ static void the_next_reading_begins_in_the_range_of_the_last(void **state)
     const int64_t start_ns = s->b.clk.t_ns;
     assert_int_equal(reading(s, start_ns, &r), 1);
     const double s_taken = (double)(s->b.clk.t_ns - start_ns) * 1e-9;
-    assert_true(fabs(s_taken - detector_settle_s(0.1, 12, 1e-4) - 3 * plan_spacing_s(0.1, 12)) < 1e-6);
+    assert_true(fabs(s_taken - detector_settle_s(0.1, 12, 1e-4) - 3 * plan_spacing_s(0.1, 12)) <
+                1e-6);
 }
 
 static void coming_down_a_steep_peak_is_waited_out(void **state)
@@ -180,8 +181,8 @@ static void coming_down_a_steep_peak_is_waited_out(void **state)
     const int64_t since_ns = s->b.clk.t_ns;
     reading(s, since_ns, &r);
     const struct optics_spec *o = &s->b.world.spec.optics;
-    const double truth_v = 2e-7 + 16 * 0.05 * optics_f_per_sr(o, 30, -70) * optics_solid_angle_sr(o) *
-                                      cos(70 * UNITS_PI / 180);
+    const double truth_v = 2e-7 + 16 * 0.05 * optics_f_per_sr(o, 30, -70) *
+                                      optics_solid_angle_sr(o) * cos(70 * UNITS_PI / 180);
     assert_true(truth_v < 2e-5);
     assert_true(fabs(r.signal_v - truth_v) < 5e-4 * truth_v + 5 * 2.3e-9);
 }

@@ -1,322 +1,17 @@
 // SPDX-License-Identifier: MIT
 // uses: daemon campaign drivers fit sim model base
 // The engine over the simulated world in virtual time, one thread, rows kept in memory.
-#include "daemon/engine.h"
-
 #include "base/units.h"
-#include "campaign/config.h"
-#include "campaign/plan.h"
-#include "campaign/store.h"
-#include "tests/unit/simbench.h"
-#include "tests/unit/simconfig.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <cmocka.h>
 
-enum { ROWS_MOST = 4000, TEXTS_MOST = 400 };
+#include "tests/unit/simrun.h"
 
-struct run {
-    struct simbench b;
-    struct bench_config bench;
-    struct instrument *in;
-    struct campaign_config config;
-    struct plan plan;
-    struct plan_point points[1000];
-    struct cancel *cancel;
-    struct engine_ports ports;
-
-    struct store_reading row[ROWS_MOST];
-    int rows;
-    char pauses[TEXTS_MOST][300];
-    int pauses_count, states_count;
-    enum run_state state;
-    int fits, last_fits, sweeps_told;
-    double f_per_sr[1000]; // provisional, by plan index
-
-    // the script
-    bool auto_resume, want_resume, want_pause;
-    int store_fails;            // so many times in a row, from row store_fail_at on
-    int store_fail_at;
-    bool store_carries_out;     // and the row is there nevertheless
-    void (*on_row)(struct run *r); // after each row
-    void (*on_pause)(struct run *r);
-    int64_t cancel_at_ns;
-    void (*on_time)(struct run *r);
-
-    // what must never happen
-    int violations;
-    char violation[200];
-};
-
-static void violate(struct run *r, const char *what)
-{
-    if (r->violations++ == 0)
-        snprintf(r->violation, sizeof r->violation, "%s at t = %.3f s, call %ld", what,
-                 (double)r->b.clk.t_ns * 1e-9, r->b.calls);
-}
-
-static bool emits(struct run *r)
-{
-    world_see(&r->b.world, r->b.clk.t_ns);
-    return sim_laser_emits(&r->b.world.laser);
-}
-
-// A laser that was unplugged can be told again once it is back and its reopening, 2 s apart, was due.
-static bool laser_reachable(const struct run *r)
-{
-    const int64_t gone_ns = r->b.gone_until_ns[SIMBENCH_LASER];
-    return !(gone_ns && r->b.clk.t_ns < gone_ns + CLK_S(2.3)) && !r->b.world.laser.ignores_off;
-}
-
-static bool at_rest(enum run_state s)
-{
-    return s == RUN_PAUSED || s == RUN_STOPPED || s == RUN_DONE || s == RUN_FAILED || s == RUN_QUEUED;
-}
-
-static const struct plan_point *point_of(const struct run *r, int sweep, int point)
-{
-    for (int i = 0; i < r->plan.count; i++)
-        if (r->points[i].sweep == sweep && r->points[i].point == point)
-            return &r->points[i];
-    return NULL;
-}
-
-static bool is_accepted(const struct store_reading *row)
-{
-    return !(row->flags & STORE_REJECTING);
-}
-
-// --- ports -------------------------------------------------------------------------------------------
-
-static bool same_row(const struct store_reading *a, const struct store_reading *b)
-{
-    return a->sweep == b->sweep && a->point == b->point && a->attempt == b->attempt;
-}
-
-static void keep(struct run *r, const struct store_reading *row)
-{
-    const struct plan_point *p = point_of(r, row->sweep, row->point);
-    for (int i = 0; i < r->rows; i++)
-        if (same_row(&r->row[i], row)) {
-            if (memcmp(&r->row[i], row, sizeof *row) != 0)
-                violate(r, "a row came twice and differs");
-            return;
-        }
-    if (r->rows > 0 && is_accepted(&r->row[r->rows - 1]) && p == point_of(r, r->row[r->rows - 1].sweep,
-                                                                           r->row[r->rows - 1].point))
-        violate(r, "a point was measured again after it was accepted");
-    if (p->kind == PLAN_DARK && emits(r))
-        violate(r, "a dark with the laser on");
-    if (p->kind != PLAN_DARK && is_accepted(row) && r->state != RUN_PAUSED && !emits(r))
-        violate(r, "light was expected");
-    if (!isfinite(row->signal_v))
-        violate(r, "not a number was stored");
-    r->row[r->rows++] = *row;
-}
-
-static int port_store(void *ctx, const struct store_reading *row, struct gon_error *err)
-{
-    struct run *r = ctx;
-    if (r->store_fails > 0 && r->rows >= r->store_fail_at) {
-        r->store_fails--;
-        if (r->store_carries_out)
-            keep(r, row);
-        return gon_fail(err, GON_E_STORE, "disk full");
-    }
-    keep(r, row);
-    if (r->on_row)
-        r->on_row(r);
-    return 0;
-}
-
-static int port_event(void *ctx, const char *level, const char *source, const char *text,
-                      struct gon_error *err)
-{
-    (void)ctx, (void)level, (void)source, (void)err;
-    assert_true(strlen(text) > 0);
-    return 0;
-}
-
-static void port_publish(void *ctx, const struct engine_event *event)
-{
-    struct run *r = ctx;
-    if (event->kind == ENGINE_SWEEP)
-        r->sweeps_told++;
-    if (event->kind == ENGINE_READING && isfinite(event->f_per_sr) && !(event->flags & STORE_REJECTING))
-        r->f_per_sr[event->point - 1] = event->f_per_sr;
-    if (event->kind != ENGINE_STATE)
-        return;
-    r->state = event->state;
-    r->states_count++;
-    if (at_rest(event->state) && laser_reachable(r) && emits(r))
-        violate(r, "laser on at rest");
-    if (event->state == RUN_PAUSED) {
-        assert_true(r->pauses_count < TEXTS_MOST);
-        snprintf(r->pauses[r->pauses_count++], sizeof r->pauses[0], "%s", event->text);
-        if (r->on_pause)
-            r->on_pause(r);
-    }
-}
-
-static void port_fit(void *ctx, int sweep, bool last)
-{
-    struct run *r = ctx;
-    (void)sweep;
-    r->fits++;
-    r->last_fits += last;
-}
-
-static bool port_resume(void *ctx)
-{
-    struct run *r = ctx;
-    bool now = r->auto_resume || r->want_resume;
-    r->want_resume = false;
-    return now;
-}
-
-static bool port_pause(void *ctx)
-{
-    struct run *r = ctx;
-    bool now = r->want_pause;
-    r->want_pause = false;
-    return now;
-}
-
-static void advanced(void *ctx, int64_t t_ns)
-{
-    struct run *r = ctx;
-    if (r->cancel_at_ns && t_ns >= r->cancel_at_ns)
-        cancel_request(r->cancel);
-    if (at_rest(r->state) && laser_reachable(r) && emits(r))
-        violate(r, "laser on at rest");
-    if (r->on_time)
-        r->on_time(r);
-}
-
-// --- a run -------------------------------------------------------------------------------------------
-
-static void add_point(struct run *r, int sweep, int point, enum plan_kind kind, double theta_i, double theta_r)
-{
-    struct plan_point *p = &r->points[r->plan.count++];
-    *p = (struct plan_point){.sweep = sweep, .point = point, .kind = kind, .theta_i_deg = theta_i,
-                             .theta_r_deg = theta_r};
-    snprintf(p->station, sizeof p->station, "%s", kind == PLAN_DARK ? "park" : kind == PLAN_BEAM ? "beam" : "");
-}
-
-// Two sweeps of five points between the reference readings.
-static void small_plan(struct run *r)
-{
-    static const double theta_i[2] = {10, 45}, theta_r[5] = {-40, 0, 10, 45, 80};
-    r->plan = (struct plan){.points = r->points, .sweeps = 2};
-    add_point(r, 0, 1, PLAN_DARK, 0, 0);
-    add_point(r, 0, 2, PLAN_BEAM, 0, 180);
-    for (int i = 0; i < 2; i++)
-        for (int k = 0; k < 5; k++)
-            add_point(r, i + 1, k + 1, PLAN_SAMPLE, theta_i[i], theta_r[k]);
-    add_point(r, 3, 1, PLAN_BEAM, 0, 180);
-    add_point(r, 3, 2, PLAN_DARK, 0, 0);
-}
-
-// The shortest that has everything.
-static void tiny_plan(struct run *r)
-{
-    r->plan = (struct plan){.points = r->points, .sweeps = 1};
-    add_point(r, 0, 1, PLAN_DARK, 0, 0);
-    add_point(r, 0, 2, PLAN_BEAM, 0, 180);
-    add_point(r, 1, 1, PLAN_SAMPLE, 30, -20);
-    add_point(r, 1, 2, PLAN_SAMPLE, 30, 30);
-    add_point(r, 2, 1, PLAN_BEAM, 0, 180);
-    add_point(r, 2, 2, PLAN_DARK, 0, 0);
-}
-
-static void quick_laser(struct world_spec *spec)
-{
-    spec->laser.temperatures_s = 0.5;
-    spec->laser.warmup_s = 5;
-}
-
-static struct run *begin(void (*tune)(struct world_spec *spec))
-{
-    struct run *r = calloc(1, sizeof *r);
-    simbench_init(&r->b, tune ? tune : quick_laser);
-    r->b.clk.on_advance = advanced;
-    r->b.clk.ctx = r;
-    simconfig_bench(&r->bench);
-    r->bench.laser.warmup_s = 5;
-    r->config.readings = 4;
-    r->config.dark_readings = 8;
-    r->config.beam_readings = 8;
-    r->cancel = cancel_new();
-    r->auto_resume = true;
-    r->ports = (struct engine_ports){.ctx = r, .clk = &r->b.clk.clk, .cancel = r->cancel,
-                                     .store_reading = port_store, .store_event = port_event,
-                                     .publish = port_publish, .request_fit = port_fit,
-                                     .take_resume = port_resume, .take_pause = port_pause};
-    struct instrument_parts parts = simbench_parts(&r->b);
-    assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
-    small_plan(r);
-    return r;
-}
-
-static enum run_state go(struct run *r)
-{
-    struct gon_error err = {0};
-    enum run_state s = engine_run(&r->ports, r->in, &r->config, &r->plan, &err);
-    if (s == RUN_FAILED)
-        print_error("failed: %s\n", err.text);
-    if (emits(r) && laser_reachable(r))
-        violate(r, "laser on after the end");
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
-        if (motion_at(&r->b.world.axis[i], r->b.clk.t_ns + CLK_S(1)).moving)
-            violate(r, "an axis moves after the end");
-    return s;
-}
-
-static void end(struct run *r)
-{
-    const int violations = r->violations;
-    if (violations)
-        print_error("%s\n", r->violation);
-    const int64_t gap_ns = safety_worst_gap_ns(instrument_safety(r->in));
-    instrument_free(r->in);
-    cancel_free(r->cancel);
-    free(r);
-    assert_int_equal(violations, 0);
-    assert_true(gap_ns <= CLK_MS(SAFETY_TICK_MOST_MS));
-}
-
-static int accepted_of(const struct run *r, const struct plan_point *p)
-{
-    int n = 0;
-    for (int i = 0; i < r->rows; i++)
-        n += r->row[i].sweep == p->sweep && r->row[i].point == p->point && is_accepted(&r->row[i]);
-    return n;
-}
-
-static void assert_complete(struct run *r)
-{
-    for (int i = 0; i < r->plan.count; i++)
-        if (accepted_of(r, &r->points[i]) != 1) {
-            print_error("sweep %d point %d has %d accepted readings\n", r->points[i].sweep,
-                        r->points[i].point, accepted_of(r, &r->points[i]));
-            fail();
-        }
-    for (int i = 0; i < r->rows; i++) // attempts count up from 1 without a gap
-        if (i == 0 || r->row[i].sweep != r->row[i - 1].sweep || r->row[i].point != r->row[i - 1].point)
-            assert_int_equal(r->row[i].attempt, 1);
-        else
-            assert_int_equal(r->row[i].attempt, r->row[i - 1].attempt + 1);
-}
-
-static double f_of(const struct run *r, const struct plan_point *p)
-{
-    const struct world_spec *w = &r->b.world.spec;
-    return optics_f_per_sr(&w->optics, p->theta_i_deg, p->theta_r_deg);
-}
-
-// --- a whole campaign --------------------------------------------------------------------------------
+// --- a whole campaign
+// --------------------------------------------------------------------------------
 
 static void a_campaign_measures_every_point_once_and_ends_dark(void **state)
 {
@@ -333,11 +28,12 @@ static void a_campaign_measures_every_point_once_and_ends_dark(void **state)
 }
 
 // f of the rows themselves, with the opening references.
-static double f_of_row(const struct run *r, const struct store_reading *row, const struct store_reading *dark,
-                       const struct store_reading *beam)
+static double f_of_row(const struct run *r, const struct store_reading *row,
+                       const struct store_reading *dark, const struct store_reading *beam)
 {
     const double ratio = (row->signal_v - dark->signal_v) / (row->monitor_v - dark->monitor_v);
-    const double beam_ratio = (beam->signal_v - dark->signal_v) / (beam->monitor_v - dark->monitor_v);
+    const double beam_ratio =
+        (beam->signal_v - dark->signal_v) / (beam->monitor_v - dark->monitor_v);
     return ratio / beam_ratio / optics_solid_angle_sr(&r->b.world.spec.optics) /
            cos(units_rad(units_deg_of_udeg(row->theta_r_udeg)));
 }
@@ -350,15 +46,15 @@ static const struct store_reading *accepted_row(const struct run *r, const struc
     return NULL;
 }
 
-// Deviations from the world's truth in units of what they should be: the filter's noise (4 nV/rtHz, 12
-// dB per octave: an equivalent bandwidth of 1/(8 TC)), four samples and the dark's eight, and 2e-4 for monitor (0.2 mV noise
-// and 1/3 mV steps of 2 V), laser noise, references and settling.
+// Deviations from the world's truth in units of what they should be: the filter's noise (4 nV/rtHz,
+// 12 dB per octave: an equivalent bandwidth of 1/(8 TC)), four samples and the dark's eight, and
+// 2e-4 for monitor (0.2 mV noise and 1/3 mV steps of 2 V), laser noise, references and settling.
 static void compare(const struct run *r, double *ret_worst, double *ret_rms)
 {
     const struct store_reading *dark = accepted_row(r, &r->points[0]);
     const struct store_reading *beam = accepted_row(r, &r->points[1]);
-    const double noise_v =
-        r->b.world.spec.noise_v_per_rthz / sqrt(8 * r->bench.detector.time_constant_s) * sqrt(1.0 / 4 + 1.0 / 8);
+    const double noise_v = r->b.world.spec.noise_v_per_rthz /
+                           sqrt(8 * r->bench.detector.time_constant_s) * sqrt(1.0 / 4 + 1.0 / 8);
     double worst = 0, squares = 0;
     int n = 0;
     for (int i = 0; i < r->plan.count; i++) {
@@ -378,18 +74,27 @@ static void compare(const struct run *r, double *ret_worst, double *ret_rms)
     *ret_rms = sqrt(squares / n);
 }
 
+static void complain(void *ctx, const char *line)
+{
+    (void)ctx;
+    print_error("%s\n", line);
+}
+
+// The paper's directions, as the plan makes them of a campaign file.
 static void paper_plan(struct run *r)
 {
-    static const double theta_i[10] = {0, 5, 10, 15, 20, 30, 40, 50, 60, 70};
-    r->plan = (struct plan){.points = r->points, .sweeps = 10};
-    add_point(r, 0, 1, PLAN_DARK, 0, 0);
-    add_point(r, 0, 2, PLAN_BEAM, 0, 180);
-    for (int i = 0; i < 10; i++)
-        for (int k = -170, n = 0; k <= 170; k++) // half degrees
-            if (k % 5 == 0 || abs(k - (int)(2 * theta_i[i])) <= 10)
-                add_point(r, i + 1, ++n, PLAN_SAMPLE, theta_i[i], 0.5 * k);
-    add_point(r, 11, 1, PLAN_BEAM, 0, 180);
-    add_point(r, 11, 2, PLAN_DARK, 0, 0);
+    static const char text[] = "campaign: { name = \"paper\"; sample = \"paint\";"
+                               " theta_i_deg = (0, 5, 10, 15, 20, 30, 40, 50, 60, 70);"
+                               " theta_r: { from_deg = -85; to_deg = 85; step_deg = 2.5; };"
+                               " dense: { half_width_deg = 5; step_deg = 0.5; weight = 3; }; };";
+    const struct cfg_sink sink = {complain, NULL};
+    struct plan plan;
+    assert_int_equal(campaign_config_parse(text, "paper", sink, &r->config), 0);
+    assert_int_equal(plan_make(&r->config, &r->bench, &plan, NULL), 0);
+    assert_int_equal(plan.count, 850 + 4);
+    memcpy(r->points, plan.points, (size_t)plan.count * sizeof *plan.points);
+    r->plan = (struct plan){.points = r->points, .count = plan.count, .sweeps = plan.sweeps};
+    plan_clear(&plan);
 }
 
 static void the_papers_campaign_comes_out_as_the_world_is(void **state)
@@ -398,7 +103,6 @@ static void the_papers_campaign_comes_out_as_the_world_is(void **state)
     struct run *r = begin(NULL);
     double worst, rms;
     paper_plan(r);
-    assert_int_equal(r->plan.count, 850 + 4);
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
     assert_int_equal(r->pauses_count, 0);
@@ -410,7 +114,8 @@ static void the_papers_campaign_comes_out_as_the_world_is(void **state)
     end(r);
 }
 
-// The demo's bench: 300 deg/s, 60000 deg/s^2, 1 ms, and 0.15 ms for each question on a pty or loopback.
+// The demo's bench: 300 deg/s, 60000 deg/s^2, 1 ms, and 0.15 ms for each question on a pty or
+// loopback.
 static void a_point_on_a_fast_bench_costs_40_ms(void **state)
 {
     (void)state;
@@ -435,22 +140,25 @@ static void a_point_on_a_fast_bench_costs_40_ms(void **state)
     double ms = 0;
     int n = 0;
     for (int i = 1; i < r->rows; i++) // within the sweeps: without the ways back
-        if (r->row[i].sweep == r->row[i - 1].sweep && r->row[i].sweep >= 1 && r->row[i].sweep <= 10) {
+        if (r->row[i].sweep == r->row[i - 1].sweep && r->row[i].sweep >= 1 &&
+            r->row[i].sweep <= 10) {
             ms += (double)(r->row[i].t_utc_ms - r->row[i - 1].t_utc_ms);
             n++;
         }
     compare(r, &worst, &rms);
-    print_message("%.1f ms a reading, %.1f s in all, %ld calls, %d rows, worst %.2g, rms %.2g\n", ms / n,
-                  all_s, r->b.calls, r->rows, worst, rms);
+    print_message("%.1f ms a reading, %.1f s in all, %ld calls, %d rows, worst %.2g, rms %.2g\n",
+                  ms / n, all_s, r->b.calls, r->rows, worst, rms);
     assert_true(ms / n < 40);
     assert_true(rms < 1.3);
     assert_true(worst < 5.0);
     end(r);
 }
 
-// --- faults ------------------------------------------------------------------------------------------
+// --- faults
+// ------------------------------------------------------------------------------------------
 
-// The n-th device call fails, for every n: nothing is lost, nothing twice, the light is off at the end.
+// The n-th device call fails, for every n: nothing is lost, nothing twice, the light is off at the
+// end.
 static void every_call_may_fail(int code, long first, long stride)
 {
     for (long n = first;; n += stride) {
@@ -462,7 +170,8 @@ static void every_call_may_fail(int code, long first, long stride)
         enum run_state s = go(r);
         const bool hit = r->b.hit_done;
         if (s != RUN_DONE || r->violations)
-            print_error("call %ld with %s: %s\n", n, gon_code_name((enum gon_code)code), run_state_name(s));
+            print_error("call %ld with %s: %s\n", n, gon_code_name((enum gon_code)code),
+                        run_state_name(s));
         assert_int_equal(s, RUN_DONE);
         assert_complete(r);
         end(r);
@@ -519,7 +228,8 @@ static void an_unplugged_device_pauses_by_name_and_resumes(void **state)
     }
 }
 
-// --- stopping and going on ---------------------------------------------------------------------------
+// --- stopping and going on
+// ---------------------------------------------------------------------------
 
 // As the store tells a resumed run: what is accepted is done, attempts go on counting.
 static void mark_done(struct run *r)
@@ -648,7 +358,8 @@ static void light_that_fails_is_never_a_reading(void **state)
     end(r);
 }
 
-// --- store -------------------------------------------------------------------------------------------
+// --- store
+// -------------------------------------------------------------------------------------------
 
 static void a_store_that_fails_loses_nothing(void **state)
 {
@@ -668,12 +379,14 @@ static void a_store_that_fails_loses_nothing(void **state)
         }
 }
 
-// --- detector ----------------------------------------------------------------------------------------
+// --- detector
+// ----------------------------------------------------------------------------------------
 
 static void glossy(struct world_spec *spec)
 {
     quick_laser(spec);
-    spec->optics.sample = (struct brdf_params){.n = 1.5, .k = 0.02, .sigma = 0.02, .ks = 0.9, .kd = 0.001};
+    spec->optics.sample =
+        (struct brdf_params){.n = 1.5, .k = 0.02, .sigma = 0.02, .ks = 0.9, .kd = 0.001};
 }
 
 static void a_glossy_peak_ranges_again_and_keeps_every_attempt(void **state)
@@ -693,7 +406,8 @@ static void a_glossy_peak_ranges_again_and_keeps_every_attempt(void **state)
         saturated += (r->row[i].flags & STORE_SATURATED) != 0;
         ranges |= 1 << r->row[i].range;
         if (is_accepted(&r->row[i]))
-            assert_true(fabs(r->row[i].signal_v) < 0.95 * simbench_full_scale_v(NULL, r->row[i].range));
+            assert_true(fabs(r->row[i].signal_v) <
+                        0.95 * simbench_full_scale_v(NULL, r->row[i].range));
     }
     assert_true(saturated > 3);
     assert_true(__builtin_popcount((unsigned)ranges) > 5);
@@ -768,7 +482,8 @@ static void nonsense_is_asked_again_and_in_the_end_somebody_is(void **state)
     end(r);
 }
 
-// --- axes --------------------------------------------------------------------------------------------
+// --- axes
+// --------------------------------------------------------------------------------------------
 
 static void restart_controller_at_seventh_row(struct run *r)
 {

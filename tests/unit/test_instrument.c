@@ -68,9 +68,9 @@ static void what_is_not_there_is_lost_by_name_and_comes_back(void **state)
     make(s);
     assert_int_equal(instrument_lost(s->in), PART_THETA_I);
     instrument_snapshot(s->in, &s->now);
-    static const char *const problems[PART_COUNT] = {"axis theta_i: hung up", "axis theta_r: hung up",
-                                                     "axis sample: hung up", "laser: hung up",
-                                                     "detector: hung up"};
+    static const char *const problems[PART_COUNT] = {
+        "axis theta_i: hung up", "axis theta_r: hung up", "axis sample: hung up", "laser: hung up",
+        "detector: hung up"};
     for (int i = 0; i < PART_COUNT; i++) {
         assert_int_equal(s->now.part[i].link, PART_LOST);
         assert_string_equal(s->now.part[i].problem, problems[i]);
@@ -207,14 +207,16 @@ static void ports_that_are_not_there_do_not_stop_the_daemon(void **state)
     struct setting *s = begin();
     s->bench.buses_count = 1;
     snprintf(s->bench.buses[0].name, sizeof s->bench.buses[0].name, "axes");
-    snprintf(s->bench.buses[0].link, sizeof s->bench.buses[0].link, "modbus-rtu:/nowhere/axes?baud=115200");
+    snprintf(s->bench.buses[0].link, sizeof s->bench.buses[0].link,
+             "modbus-rtu:/nowhere/axes?baud=115200");
     s->bench.buses[0].timeout_ms = 100;
     for (int i = 0; i < 3; i++) {
         snprintf(s->bench.axes[i].bus, sizeof s->bench.axes[i].bus, "axes");
         s->bench.axes[i].unit = i + 1;
     }
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "serial:/nowhere/laser?baud=115200");
-    snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/detector?baud=9600");
+    snprintf(s->bench.detector.link, sizeof s->bench.detector.link,
+             "serial:/nowhere/detector?baud=9600");
     struct gon_error err;
     assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), 0);
     instrument_snapshot(s->in, &s->now);

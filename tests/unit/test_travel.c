@@ -44,8 +44,8 @@ static double load(struct setting *s, enum world_axis axis)
     return motion_at(&s->b.world.axis[axis], s->b.clk.t_ns).load;
 }
 
-static int move(struct setting *s, double theta_i, double theta_r, double sample, struct travel_pose *ret,
-                struct gon_error *err)
+static int move(struct setting *s, double theta_i, double theta_r, double sample,
+                struct travel_pose *ret, struct gon_error *err)
 {
     const struct travel_pose target = {.at = {theta_i, theta_r, sample}};
     return travel_move(s->in, &target, s->cancel, ret, err);
@@ -142,7 +142,7 @@ static void a_carried_out_move_with_a_lost_answer_is_sent_once(void **state)
     assert_int_equal(move(s, 0, 0, 0, &at, NULL), 0);
     const int moves = s->b.axis[PART_THETA_R].moves;
     s->b.fail_code = GON_E_LINK;
-    s->b.calls = 2;   // the move is call 3: odd, so it is carried out
+    s->b.calls = 2; // the move is call 3: odd, so it is carried out
     s->b.fail_at = 3;
     assert_int_equal(move(s, NAN, 35, NAN, &at, NULL), 0);
     assert_true(s->b.hit_done);

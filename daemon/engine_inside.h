@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// What engine.c (the run) and engine_light.c (the laser's part in it) share; nobody else includes
+// it.
+#pragma once
+#include "daemon/acquire.h"
+#include "daemon/engine.h"
+#include "daemon/instrument.h"
+
+struct plan_point;
+
+struct engine {
+    const struct engine_ports *ports;
+    struct instrument *in;
+    const struct campaign_config *config;
+    const struct plan *plan;
+
+    enum run_state state;
+    const struct plan_point *point; // in progress; NULL: none
+    int done, attempt;
+    bool ready;  // connected, homed
+    bool lit;    // laser on, warmed up, monitor steady
+    bool dark;   // laser off, read back at this campaign's own request
+    int returns; // pauses that ended by themselves since the last accepted reading
+    int64_t light_ns, laser_look_ns;
+    struct acquire acquire;
+
+    double omega_sr, monitor_dark_v, monitor_lit_v;
+    struct engine_opening opening;
+    int64_t first_ns;
+    int first_done;
+    struct gon_error why; // of the last failure
+};
+
+// Functions return 0, or a gon_code with its text in e->why.
+
+// An event row, and the same for whoever watches.
+void engine_say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt,
+                ...) __attribute__((format(printf, 4, 5)));
+int engine_nap(struct engine *e, int64_t ns); // GON_E_CANCELED
+bool engine_pause_asked(struct engine *e);    // true once
+int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
+
+// Darks without light, everything else with it, warmed up and steady.
+int engine_light_for(struct engine *e);
+// The laser was on and should be: one short question, and only when it is due; or all there is to
+// know.
+int engine_watch_laser(struct engine *e);
+int engine_check_laser(struct engine *e);
