@@ -8,7 +8,9 @@
 #include "tests/unit/noisy.h"
 #include "tests/unit/vline.h"
 
+#include <arpa/inet.h>
 #include <modbus/modbus.h>
+#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -350,6 +352,68 @@ static void a_descriptor_too_large_for_select_is_refused(void **state)
     setrlimit(RLIMIT_NOFILE, &before);
 }
 
+// --- TCP, on a real socket ------------------------------------------------------------------------------
+
+static void *serve_tcp(void *ctx)
+{
+    const int server = *(int *)ctx;
+    struct pollfd p[2] = {{server, POLLIN, 0}, {-1, POLLIN, 0}};
+    uint8_t bytes[300];
+    for (int connections = 0;;) {
+        const int64_t due_ns = port_next_ns(&slave.m.port), now_ns = clk_now_ns(clk_system());
+        const int wait_ms = due_ns == PORT_NEVER ? 20000 : due_ns > now_ns ? (int)((due_ns - now_ns) / 1000000) + 1 : 0;
+        poll(p, 2, wait_ms);
+        if (p[0].revents & POLLIN) { // a new connection instead of the one before
+            if (p[1].fd >= 0)
+                close(p[1].fd);
+            p[1].fd = accept(server, NULL, NULL);
+            port_hangup(&slave.m.port);
+            slave.m.port.delay_ns = connections++ ? 0 : MS(400);
+        } else if (p[1].fd >= 0 && p[1].revents) {
+            ssize_t n = read(p[1].fd, bytes, sizeof bytes);
+            if (n <= 0 && connections == 2)
+                break;
+            port_feed(&slave.m.port, bytes, n > 0 ? (size_t)n : 0, clk_now_ns(clk_system()));
+        }
+        size_t n = port_take(&slave.m.port, clk_now_ns(clk_system()), bytes, NULL);
+        if (n > 0 && write(p[1].fd, bytes, n) < 0)
+            break;
+    }
+    close(p[1].fd);
+    return NULL;
+}
+
+// libmodbus would stay one behind after a late answer: its transactions never fit again.
+static void tcp_reconnects_after_a_late_answer(void **state)
+{
+    struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof a;
+    struct bus *b;
+    struct gon_error err;
+    pthread_t thread;
+    char link[64];
+    uint16_t r[4];
+    (void)state;
+    slave_init(true);
+    int server = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_true(bind(server, (struct sockaddr *)&a, sizeof a) == 0 && listen(server, 4) == 0);
+    getsockname(server, (struct sockaddr *)&a, &size);
+    snprintf(link, sizeof link, "modbus-tcp:127.0.0.1:%d", ntohs(a.sin_port));
+    assert_int_equal(pthread_create(&thread, NULL, serve_tcp, &server), 0);
+    if (bus_open(link, 200, 350, clk_system(), NULL, &b, &err) < 0)
+        fail_msg("%s", err.text);
+    assert_int_equal(bus_read(b, 2, 10, 4, r, &err), 0);
+    assert_int_equal(r[3], 2013);
+    assert_int_equal(bus_stats(b)->reopened, 1);
+    assert_int_equal(bus_stats(b)->timeouts, 1);
+    assert_int_equal(bus_read(b, 1, 20, 2, r, &err), 0);
+    assert_int_equal(r[1], 1021);
+    assert_int_equal(bus_stats(b)->reopened, 1);
+    bus_close(b);
+    pthread_join(thread, NULL);
+    close(server);
+}
+
 // --- many readings under faults ------------------------------------------------------------------------
 
 enum { READINGS = 10000, SEED = 20240917 };
@@ -446,6 +510,7 @@ int main(void)
         cmocka_unit_test(reads_can_be_cancelled_and_writes_go_out_anyway),
         cmocka_unit_test(nothing_waits_longer_than_one_answer),
         cmocka_unit_test(a_descriptor_too_large_for_select_is_refused),
+        cmocka_unit_test(tcp_reconnects_after_a_late_answer),
         cmocka_unit_test(no_wrong_value_under_faults),
         cmocka_unit_test(the_bare_library_gives_wrong_values),
     };

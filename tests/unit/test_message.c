@@ -320,6 +320,30 @@ static void nothing_waits_long_without_a_turn(void **state)
     message_free(m);
 }
 
+// A byte every millisecond, for ever.
+static void babble(struct port *p, int64_t t_ns)
+{
+    port_send(p, "x", 1, t_ns);
+    p->tick_ns = t_ns + MS(1);
+}
+
+static void a_line_that_never_falls_silent_is_given_up(void **state)
+{
+    static const struct port_ops ops = {scripted_feed, babble, scripted_hangup};
+    struct scripted s;
+    struct gon_error err;
+    (void)state;
+    struct message *m = begin(&s, hear_nothing, NULL);
+    s.port.ops = &ops;
+    s.port.tick_ns = vline.clk.t_ns;
+    const int64_t start_ns = vline.clk.t_ns;
+    assert_int_equal(transport_drain(message_transport(m), MS(100), &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "does not stop sending"));
+    assert_true(vline.clk.t_ns - start_ns < CLK_S(3));
+    assert_true(vline.longest_ns <= MS(51)); // others had their turn all the same
+    message_free(m);
+}
+
 static void asking_again_is_bounded(void **state)
 {
     struct scripted s;
@@ -482,6 +506,7 @@ int main(void)
         cmocka_unit_test(waiting_can_be_cancelled_but_not_what_must_be_said),
         cmocka_unit_test(a_short_write_goes_on),
         cmocka_unit_test(nothing_waits_long_without_a_turn),
+        cmocka_unit_test(a_line_that_never_falls_silent_is_given_up),
         cmocka_unit_test(asking_again_is_bounded),
         cmocka_unit_test(no_wrong_value_under_faults),
         cmocka_unit_test(numbers_as_instruments_write_them),
