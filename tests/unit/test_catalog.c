@@ -144,7 +144,7 @@ static void numbers_are_given_out_once(void **state)
         if (fork() == 0) {
             for (int i = 0; i < EACH; i++) {
                 int id;
-                char name[20];
+                char name[40];
                 snprintf(name, sizeof name, "p%d-%d", k, i);
                 store_close(created(name, &id), NULL);
             }
