@@ -52,7 +52,7 @@ static double seconds_left(const struct engine *e)
 {
     const int here = e->done - e->first_done;
     if (here < 3)
-        return NAN;
+        return (double)NAN;
     const double s = (double)(clk_now_ns(e->ports->clk) - e->first_ns) * 1e-9;
     return s / here * (e->plan->count - e->done);
 }
@@ -70,8 +70,8 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
         .points = e->plan->count,
         .theta_i_deg = p ? p->theta_i_deg : (double)NAN,
         .theta_r_deg = p ? p->theta_r_deg : (double)NAN,
-        .f_per_sr = NAN,
-        .u_per_sr = NAN,
+        .f_per_sr = (double)NAN,
+        .u_per_sr = (double)NAN,
         .left_s = seconds_left(e),
         .emission = instrument_emission(e->in),
         .text = text,
@@ -340,7 +340,7 @@ static int go_to(struct engine *e, struct travel_pose *ret_at)
     struct travel_pose pose = {.at = {p->theta_i_deg, p->theta_r_deg, 0.0}};
     int rc = 0;
     if (p->kind == PLAN_DARK && !p->station[0])
-        pose = (struct travel_pose){.at = {NAN, NAN, NAN}};
+        pose = (struct travel_pose){.at = {(double)NAN, (double)NAN, (double)NAN}};
     else if (p->kind != PLAN_SAMPLE)
         rc = travel_station(e->in, p->station, &pose, &e->why);
     return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
@@ -527,9 +527,9 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .state = RUN_QUEUED,
         .acquire = {.range = -1},
         .omega_sr = bench_omega_sr(bench),
-        .monitor_dark_v = NAN,
-        .monitor_lit_v = NAN,
-        .opening = {NAN, NAN, NAN, NAN},
+        .monitor_dark_v = (double)NAN,
+        .monitor_lit_v = (double)NAN,
+        .opening = {(double)NAN, (double)NAN, (double)NAN, (double)NAN},
         .first_ns = clk_now_ns(ports->clk),
     };
     if (ports->opening) {

@@ -154,7 +154,7 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     if (rc < 0)
         return rc;
     m->engaged = m->config->backlash <= 0;
-    m->commanded = NAN;
+    m->commanded = (double)NAN;
     m->seen_ns = INT64_MIN;
     return m->axis->ops->stop(m->axis, err);
 }
@@ -231,8 +231,8 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     in->breathing = (struct breathing){{&ops}, clk, in};
     in->range = -1;
     in->time_constant_s = bench->detector.time_constant_s;
-    in->sample = (struct detector_sample){NAN, NAN, NAN};
-    in->laser = (struct laser_status){.power_w = NAN, .setpoint_w = NAN};
+    in->sample = (struct detector_sample){(double)NAN, (double)NAN, (double)NAN};
+    in->laser = (struct laser_status){.power_w = (double)NAN, .setpoint_w = (double)NAN};
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
         in->part[part] =
             (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
@@ -240,9 +240,9 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
         struct motor *m = &in->motor[part];
         *m = (struct motor){.config = bench_find_axis(bench, part_names[part]),
                             .bus = -1,
-                            .commanded = NAN,
+                            .commanded = (double)NAN,
                             .seen_ns = INT64_MIN,
-                            .place = {.position = NAN, .target = NAN}};
+                            .place = {.position = (double)NAN, .target = (double)NAN}};
         if (!m->config)
             in->part[part].link = PART_ABSENT;
     }

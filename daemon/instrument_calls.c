@@ -104,7 +104,7 @@ static int command(struct instrument *in, enum instrument_part part,
 {
     struct motor *m = &in->motor[part];
     m->engaged = m->config->backlash <= 0;
-    m->commanded = NAN;
+    m->commanded = (double)NAN;
     m->seen_ns = INT64_MIN;
     return instrument_note(in, part, call(m->axis, err), err);
 }

@@ -195,7 +195,7 @@ static int where(struct instrument *in, const struct travel_pose *target,
 {
     struct travel_pose pose = {.still_ns = instrument_now_ns(in)};
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
-        struct axis_place p = {.position = NAN};
+        struct axis_place p = {.position = (double)NAN};
         if (instrument_has(in, part)) {
             int rc = instrument_place_recent(in, part, &p, err);
             if (rc >= 0)

@@ -253,7 +253,7 @@ static void a_cancel_ends_it(void **state)
     struct setting *s = *state;
     struct acquire_reading r;
     struct gon_error err;
-    const struct acquire_wish wish = {.count = 4, .monitor_least_v = NAN};
+    const struct acquire_wish wish = {.count = 4, .monitor_least_v = (double)NAN};
     cancel_request(s->cancel);
     assert_int_equal(acquire_attempt(s->in, &s->a, &wish, s->cancel, &r, &err), GON_E_CANCELED);
 }

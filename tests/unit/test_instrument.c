@@ -183,7 +183,7 @@ static void user_units_have_zero_and_direction(void **state)
     assert_true(fabs(p.position - 20.0) < 1e-9);
     assert_true(fabs(instrument_rounded(s->in, PART_THETA_R, 20.0009) - 20.0) < 1e-9);
     assert_int_equal(instrument_go(s->in, PART_THETA_R, -181, &err), GON_E_INPUT);
-    assert_int_equal(instrument_go(s->in, PART_THETA_R, NAN, &err), GON_E_INPUT);
+    assert_int_equal(instrument_go(s->in, PART_THETA_R, (double)NAN, &err), GON_E_INPUT);
     end(s);
 }
 

@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#define STAY ((double)NAN) // leave that axis where it is
+
 struct setting {
     struct simbench b;
     struct bench_config bench;
@@ -66,7 +68,7 @@ static void axes_start_together_and_arrive_in_the_predicted_time(void **state)
     struct travel_pose at;
     assert_int_equal(move(s, 5, -50, 0, &at, NULL), 0); // and takes up the play
     const int64_t start_ns = s->b.clk.t_ns;
-    assert_int_equal(move(s, 45, 30, NAN, &at, NULL), 0);
+    assert_int_equal(move(s, 45, 30, STAY, &at, NULL), 0);
     const double s_taken = (double)(s->b.clk.t_ns - start_ns) * 1e-9;
     const double slowest = travel_time_s(80, 20, 60);
     assert_true(s_taken >= slowest && s_taken < slowest + 0.06); // one poll of 50 ms at the most
@@ -105,10 +107,10 @@ static void a_missed_position_is_sought_again_twice_and_then_reported(void **sta
     struct travel_pose at;
     struct gon_error err;
     s->b.axis[PART_THETA_R].misses = 2;
-    assert_int_equal(move(s, NAN, 30, NAN, &at, &err), 0);
+    assert_int_equal(move(s, STAY, 30, STAY, &at, &err), 0);
     assert_float_equal(at.at[PART_THETA_R], 30, 0.003);
     s->b.axis[PART_THETA_R].misses = 100;
-    assert_int_equal(move(s, NAN, 50, NAN, &at, &err), GON_E_DEVICE);
+    assert_int_equal(move(s, STAY, 50, STAY, &at, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "axis theta_r"));
     assert_non_null(strstr(err.text, "after 3 tries"));
 }
@@ -124,14 +126,14 @@ static void a_lost_answer_to_a_move_is_resolved_by_reading_the_status(void **sta
     for (int k = 1; k < 12; k++) { // whichever call is hit; odd call numbers are carried out
         s->b.fail_at = s->b.calls + k;
         s->b.hit_done = false;
-        (void)move(s, NAN, s->b.axis[PART_THETA_R].moves % 2 ? 20 : 10, NAN, &at, NULL);
+        (void)move(s, STAY, s->b.axis[PART_THETA_R].moves % 2 ? 20 : 10, STAY, &at, NULL);
     }
     s->b.fail_at = 0;
     // not carried out: read back, then sent again
     const int before = s->b.axis[PART_THETA_R].moves;
     assert_true(before > moves);
     s->b.axis[PART_THETA_R].swallow = true;
-    assert_int_equal(move(s, NAN, 42, NAN, &at, NULL), 0);
+    assert_int_equal(move(s, STAY, 42, STAY, &at, NULL), 0);
     assert_float_equal(at.at[PART_THETA_R], 42, 1e-9);
 }
 
@@ -144,7 +146,7 @@ static void a_carried_out_move_with_a_lost_answer_is_sent_once(void **state)
     s->b.fail_code = GON_E_LINK;
     s->b.calls = 2; // the move is call 3: odd, so it is carried out
     s->b.fail_at = 3;
-    assert_int_equal(move(s, NAN, 35, NAN, &at, NULL), 0);
+    assert_int_equal(move(s, STAY, 35, STAY, &at, NULL), 0);
     assert_true(s->b.hit_done);
     assert_int_equal(s->b.axis[PART_THETA_R].moves, moves + 1);
 }
@@ -158,7 +160,7 @@ static void a_move_that_never_ends_is_reported_and_stopped(void **state)
     const int stops = s->b.axis[PART_THETA_I].stops;
     assert_int_equal(move(s, 0, 0, 0, &at, &err), 0);
     s->b.axis[PART_THETA_R].frozen = false;
-    const struct travel_pose target = {.at = {40, 40, NAN}};
+    const struct travel_pose target = {.at = {40, 40, STAY}};
     s->b.axis[PART_THETA_R].frozen = true;
     clk_sleep(&s->b.clk.clk, CLK_S(1), NULL); // what was seen longer ago is asked again
     // frozen from the start: it is told to stop first and does not
@@ -184,7 +186,7 @@ static void a_deadline_ends_a_move(void **state)
     const int64_t start_ns = s->b.clk.t_ns;
     s->b.clk.on_advance = freeze_theta_r;
     s->b.clk.ctx = s;
-    assert_int_equal(move(s, NAN, 20, NAN, &at, &err), GON_E_DEVICE);
+    assert_int_equal(move(s, STAY, 20, STAY, &at, &err), GON_E_DEVICE);
     s->b.clk.on_advance = NULL;
     assert_non_null(strstr(err.text, "axis theta_r: still not at 20"));
     const double s_taken = (double)(s->b.clk.t_ns - start_ns) * 1e-9;
@@ -220,7 +222,7 @@ static void targets_beyond_the_travel_are_refused_before_moving(void **state)
     struct travel_pose at;
     struct gon_error err;
     const int moves = s->b.axis[PART_THETA_I].moves;
-    assert_int_equal(move(s, 90, NAN, NAN, &at, &err), GON_E_INPUT);
+    assert_int_equal(move(s, 90, STAY, STAY, &at, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "axis theta_i: 90.0000 deg is outside its travel -5..88 deg"));
     assert_int_equal(s->b.axis[PART_THETA_I].moves, moves);
 }
