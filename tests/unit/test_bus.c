@@ -26,6 +26,7 @@ struct slave {
     uint16_t registers[2][REGISTERS];
     int exception, exceptions_left; // answered to that many requests
     int requests, writes;
+    bool numbered; // the first register of an answer is the number of its request
 };
 
 static struct slave slave;
@@ -47,6 +48,8 @@ static int read_named(void *ctx, int address, int count, uint16_t *ret, int64_t 
         exception = 2;
     if (exception == 0)
         memcpy(ret, (uint16_t *)ctx + address, (size_t)count * 2);
+    if (slave.numbered)
+        ret[0] = (uint16_t)slave.requests;
     return exception;
 }
 
@@ -215,6 +218,35 @@ static void a_lost_answer_repeats_reads_but_never_writes(void **state)
     slave.m.port.drop = 3;
     assert_int_equal(bus_read(b, 1, 0, 2, r, &err), GON_E_LINK);
     assert_non_null(strstr(err.text, "unit 1 does not answer"));
+    bus_close(b);
+}
+
+// Also when the next question is the very same.
+static void a_late_answer_is_never_taken(void **state)
+{
+    uint16_t r[2];
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    slave.numbered = true;
+    for (int i = 0; i < 20; i++) {
+        if (i % 3 == 0)
+            slave.m.port.delay_ns = MS(100) + i * MS(12);
+        assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
+        assert_int_equal(r[0], slave.requests);
+    }
+    bus_close(b);
+}
+
+static void what_comes_unasked_is_dropped_before_a_request(void **state)
+{
+    uint16_t r[2];
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    port_send(&slave.m.port, "\1\3\4\0", 4, vline.clk.t_ns);
+    assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
+    assert_int_equal(r[0], 1000);
+    assert_int_equal(bus_stats(b)->garbled, 1);
+    assert_int_equal(bus_stats(b)->retries, 0);
     bus_close(b);
 }
 
@@ -431,8 +463,8 @@ static int count_of(int i)
 
 static bool is_right(int i, const uint16_t *r)
 {
-    bool right = true;
-    for (int k = 0; k < count_of(i); k++)
+    bool right = r[0] == (uint16_t)slave.requests;
+    for (int k = 1; k < count_of(i); k++)
         right &= r[k] == (1 + i / 2 % 2) * 1000 + address_of(i) + k;
     return right;
 }
@@ -453,6 +485,7 @@ static void no_wrong_value_under_faults(void **state)
     (void)state;
     begin_noisy();
     struct bus *b = begin(&noisy.port, NULL);
+    slave.numbered = true;
     for (int i = 0; i < READINGS; i++)
         if (bus_read(b, 1 + i / 2 % 2, address_of(i), count_of(i), r, NULL) == 0) {
             good++;
@@ -504,6 +537,8 @@ int main(void)
         cmocka_unit_test(a_busy_unit_is_waited_for),
         cmocka_unit_test(an_acknowledged_write_is_not_repeated),
         cmocka_unit_test(a_lost_answer_repeats_reads_but_never_writes),
+        cmocka_unit_test(a_late_answer_is_never_taken),
+        cmocka_unit_test(what_comes_unasked_is_dropped_before_a_request),
         cmocka_unit_test(a_unit_that_is_not_there_does_not_answer),
         cmocka_unit_test(wrong_unit_function_length_or_checksum_is_no_answer),
         cmocka_unit_test(a_hang_up_is_gone_and_a_new_plug_works),

@@ -139,7 +139,7 @@ static void hear_stubborn(struct scripted *s, const char *text, int64_t t_ns)
     else if (strstr(text, "*IDN?"))
         scripted_say(s, "Stanford_Research_Systems,SR830,s/n1,ver1.0\r", t_ns + MS(5));
     else
-        scripted_say(s, "16\r", t_ns + MS(5)); // *ESR?
+        scripted_say(s, s->step ? "16\r" : "0\r", t_ns + MS(5)); // *ESR?
 }
 
 static void a_setting_that_does_not_take_is_an_error(void **state)
@@ -150,7 +150,10 @@ static void a_setting_that_does_not_take_is_an_error(void **state)
     scripted_init(&s, "\r", hear_stubborn);
     struct detector *d = open_on(&s.port);
     assert_int_equal(d->ops->set_range(d, 20, &err), GON_E_DEVICE);
-    assert_non_null(strstr(err.text, "refuses SENS 20 (it reads back 26, *ESR? is 16)"));
+    assert_non_null(strstr(err.text, "refuses SENS 20 (it reads back 26, *ESR? is 0)"));
+    s.step = 1; // reads back as told, but complains
+    assert_int_equal(d->ops->set_range(d, 26, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "refuses SENS 26 (it reads back 26, *ESR? is 16)"));
     d->ops->free(d);
 }
 

@@ -224,6 +224,43 @@ static void off_ends_a_start_that_is_under_way(void **state)
     }
 }
 
+// A laser that says that it does not emit, but whose sequence only "@cob0" ends; or nothing does.
+static char heard[8][16];
+static bool stubborn;
+
+static void hear_sequence(struct scripted *s, const char *text, int64_t t_ns)
+{
+    if (s->heard <= 8)
+        snprintf(heard[s->heard - 1], sizeof heard[0], "%s", text);
+    if (strcmp(text, "@cob0") == 0 && !stubborn)
+        s->step = 1;
+    if (strcmp(text, "l?") == 0)
+        scripted_say(s, "0\r\n", t_ns + MS(2));
+    else if (strcmp(text, "gom?") == 0)
+        scripted_say(s, s->step ? "0\r\n" : "1\r\n", t_ns + MS(2));
+    else if (*text)
+        scripted_say(s, "OK\r\n", t_ns + MS(2));
+}
+
+static void off_is_not_confirmed_while_a_start_goes_on(void **state)
+{
+    struct scripted s;
+    struct gon_error err;
+    (void)state;
+    stubborn = false;
+    scripted_init(&s, "\r", hear_sequence);
+    struct laser *l = open_on(&s.port, NULL);
+    assert_int_equal(l->ops->off(l, &err), 0);
+    assert_int_equal(s.step, 1);
+    assert_string_equal(heard[0], ""); // ends what was half-sent
+    assert_string_equal(heard[1], "l0");
+    stubborn = true;
+    s.step = 0;
+    assert_int_equal(l->ops->off(l, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "LASER MAY BE ON"));
+    l->ops->free(l);
+}
+
 static void a_laser_that_ignores_off_is_an_alarm(void **state)
 {
     struct gon_error err;
@@ -430,6 +467,7 @@ int main(void)
         cmocka_unit_test(off_is_sent_at_once_and_again_after_the_gap),
         cmocka_unit_test(off_is_not_swallowed_by_half_a_command),
         cmocka_unit_test(off_ends_a_start_that_is_under_way),
+        cmocka_unit_test(off_is_not_confirmed_while_a_start_goes_on),
         cmocka_unit_test(a_laser_that_ignores_off_is_an_alarm),
         cmocka_unit_test(off_is_confirmed_only_by_the_laser_itself),
         cmocka_unit_test(off_does_not_mind_being_cancelled),

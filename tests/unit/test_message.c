@@ -306,6 +306,22 @@ static void a_short_write_goes_on(void **state)
     message_free(m);
 }
 
+static void after_half_a_command_it_gets_into_step(void **state)
+{
+    struct scripted s;
+    char answer[32];
+    struct gon_error err;
+    (void)state;
+    struct message *m = begin(&s, hear_well, NULL);
+    vline.stuck = true;
+    assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "took only 0 of 3 bytes"));
+    vline.stuck = false;
+    assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), 0);
+    assert_int_equal(s.heard, 2); // "id?" came first
+    message_free(m);
+}
+
 // The clock gets its turn at least every 50 ms, also while a line is being drained.
 static void nothing_waits_long_without_a_turn(void **state)
 {
@@ -340,6 +356,7 @@ static void a_line_that_never_falls_silent_is_given_up(void **state)
     assert_int_equal(transport_drain(message_transport(m), MS(100), &err), GON_E_LINK);
     assert_non_null(strstr(err.text, "does not stop sending"));
     assert_true(vline.clk.t_ns - start_ns < CLK_S(3));
+    vline_turn();
     assert_true(vline.longest_ns <= MS(51)); // others had their turn all the same
     message_free(m);
 }
@@ -505,6 +522,7 @@ int main(void)
         cmocka_unit_test(a_hang_up_is_no_timeout),
         cmocka_unit_test(waiting_can_be_cancelled_but_not_what_must_be_said),
         cmocka_unit_test(a_short_write_goes_on),
+        cmocka_unit_test(after_half_a_command_it_gets_into_step),
         cmocka_unit_test(nothing_waits_long_without_a_turn),
         cmocka_unit_test(a_line_that_never_falls_silent_is_given_up),
         cmocka_unit_test(asking_again_is_bounded),

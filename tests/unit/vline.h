@@ -31,6 +31,7 @@ struct vline {
     uint8_t in[1 << 16];
     size_t have;
     size_t write_most;      // bytes taken by one write; 0: all
+    bool stuck;             // takes nothing: the line is full
     int64_t hangup_ns;      // the plug is pulled then
     int64_t cancel_ns;      // and this is requested then
     struct cancel *cancel;
@@ -118,9 +119,14 @@ int vline_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout, co
         return VLINE_REAL(ppoll)(fds, n, timeout, mask);
     for (nfds_t i = 0; i < n; i++)
         fds[i].revents = 0;
-    bool ready = fds[0].events & POLLIN
-                     ? vline_wait(vline.clk.t_ns + timeout->tv_sec * 1000000000 + timeout->tv_nsec)
-                     : true;
+    const int64_t until_ns = vline.clk.t_ns + timeout->tv_sec * 1000000000 + timeout->tv_nsec;
+    bool ready = true;
+    if (fds[0].events & POLLIN)
+        ready = vline_wait(until_ns);
+    else if (vline.stuck) {
+        vline.clk.t_ns = until_ns;
+        ready = false;
+    }
     if (ready)
         fds[0].revents = vline_hung_up() && vline.have == 0 ? (short)(POLLHUP | (fds[0].events & POLLIN))
                                                             : fds[0].events;
