@@ -193,6 +193,17 @@ static int interrupt_open(sigset_t *ret_before)
     return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
+// A signal that came must not be delivered once more when the mask is lifted.
+static void interrupt_close(int fd)
+{
+    struct signalfd_siginfo info;
+    if (fd < 0)
+        return;
+    while (read(fd, &info, sizeof info) == (ssize_t)sizeof info)
+        continue;
+    close(fd);
+}
+
 int follow_run(struct client *c, int run, const char *file, const char *last_id, bool json)
 {
     struct follow f = {.run = run, .file = file, .json = json, .live = !json && out_colour(stderr)};
@@ -213,8 +224,7 @@ int follow_run(struct client *c, int run, const char *file, const char *last_id,
         status = report_end(&f);
     }
     json_decref(f.fit);
-    if (fd >= 0)
-        close(fd);
+    interrupt_close(fd);
     sigprocmask(SIG_SETMASK, &before, NULL);
     return status;
 }

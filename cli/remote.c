@@ -79,15 +79,16 @@ static void print_laser(const json_t *d)
 
 static void print_detector(const json_t *d)
 {
-    const json_t *v = json_object_get(d, "full_scale_v");
-    if (json_is_number(v))
-        printf("full scale %g V", json_number_value(v));
-    v = json_object_get(d, "signal_v");
-    if (json_is_number(v))
-        printf(", last %.4g V", json_number_value(v));
-    v = json_object_get(d, "time_constant_s");
-    if (json_is_number(v))
-        printf(", time constant %g s", json_number_value(v));
+    static const char *const keys[] = {"full_scale_v", "signal_v", "time_constant_s"};
+    static const char *const names[] = {"full scale", "last", "time constant"};
+    const char *between = "";
+    for (int i = 0; i < 3; i++) {
+        const json_t *v = json_object_get(d, keys[i]);
+        if (!json_is_number(v))
+            continue;
+        printf("%s%s %.4g %s", between, names[i], json_number_value(v), i < 2 ? "V" : "s");
+        between = ", ";
+    }
 }
 
 static void print_device(const json_t *d)

@@ -136,9 +136,10 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
     json_int_t id = json_integer_value(what);
     if (!json_is_integer(what) || id < 1 || id > 2147483647)
         return fail(400, "\"resume\" is neither a run's number nor a path", NULL, "see: gonio list");
+    uint64_t event_id = hub_event_id(c->hub);
     if (hub_submit(c->hub, (int)id, &err) < 0)
         return failed(&err);
-    return reply(201, hub_submitted(c->hub, (int)id));
+    return reply(201, hub_submitted(c->hub, (int)id, event_id));
 }
 
 static struct http_reply create_run(const struct call *c, json_t *body)
@@ -178,7 +179,7 @@ static struct http_reply told(const struct call *c, int run, const struct gon_er
 {
     if (run < 0)
         return failed(err);
-    return reply(202, hub_submitted(c->hub, run));
+    return reply(202, hub_submitted(c->hub, run, hub_event_id(c->hub)));
 }
 
 static struct http_reply post_pause(const struct call *c)

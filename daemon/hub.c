@@ -182,11 +182,16 @@ static void rearm_port(void *ctx)
 
 // --- requests -------------------------------------------------------------------------------------
 
-char *hub_submitted(const struct hub *h, int run)
+uint64_t hub_event_id(const struct hub *h)
+{
+    return events_last_id(h->events);
+}
+
+char *hub_submitted(const struct hub *h, int run, uint64_t event_id)
 {
     const struct run *r = queue_run(h->queue, run);
     json_t *o = view_run(r, false);
-    json_object_set_new(o, "event_id", json_integer((json_int_t)events_last_id(h->events)));
+    json_object_set_new(o, "event_id", json_integer((json_int_t)event_id));
     return view_text(o);
 }
 
@@ -275,10 +280,11 @@ int hub_resume(struct hub *h, struct gon_error *err)
 static void known(struct hub *h, struct note *n)
 {
     struct gon_error err = n->err;
+    uint64_t event_id = hub_event_id(h);
     struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
     int rc = run ? hub_submit(h, run->id, &err) : (int)err.code;
     if (rc == 0) {
-        http_answer(h->http, n->ticket, 201, hub_submitted(h, run->id));
+        http_answer(h->http, n->ticket, 201, hub_submitted(h, run->id, event_id));
     } else {
         if (rc == GON_E_STORE)
             snprintf(h->last_error, sizeof h->last_error, "%s", err.text);

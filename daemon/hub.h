@@ -52,5 +52,6 @@ void hub_stop(struct hub *h, const char *why, uint64_t ticket);
 int hub_pause(struct hub *h, struct gon_error *err);  // the run that has the bench: its id
 int hub_resume(struct hub *h, struct gon_error *err); // the paused run: its id
 
-// A run with the id of the event after which it can be followed, as JSON text.
-char *hub_submitted(const struct hub *h, int run);
+uint64_t hub_event_id(const struct hub *h); // of the newest event
+// A run with the id of the event after which all of it can be followed, as JSON text.
+char *hub_submitted(const struct hub *h, int run, uint64_t event_id);

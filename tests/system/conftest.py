@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Helpers of the system tests: programs started with bounded waits on what they say, HTTP over the Unix
 socket, the event stream, and goniosim's control socket. Every process is ended by its own id."""
+import atexit
+import hashlib
 import http.client
 import json
 import os
 import pathlib
 import queue
+import shutil
 import signal
 import socket
 import subprocess
+import tempfile
 import threading
 import time
 
@@ -17,6 +21,8 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("GONIO_BUILD", ROOT / "build")).resolve()
 PATIENCE_S = 20.0  # for anything that should be there within a second; generous for a loaded machine
+
+QUICK_LASER = ("--set", "laser.warmup_s=0.05", "--set", "laser.temperatures_s=0")
 
 SMALL = """\
 campaign: {
@@ -144,12 +150,26 @@ class Sim(Program):
 
 def control(path, **command):
     """One question to goniosim's control socket: control(path, do="unplug", wire="laser")."""
+    path = pathlib.Path(path)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as s:
         s.settimeout(PATIENCE_S)
-        s.connect(str(path))
+        folder = os.open(path.parent, os.O_PATH)
+        try:
+            s.connect(f"/proc/self/fd/{folder}/{path.name}")  # whatever the path's length
+        finally:
+            os.close(folder)
         s.sendall(json.dumps(command).encode() + b"\n")
         with s.makefile() as answers:
             return json.loads(answers.readline())
+
+
+def short_folder(of):
+    """A folder for sockets that belongs to a folder: a socket's address holds 107 bytes, less than tmp_path may need."""
+    name = hashlib.sha1(str(of).encode()).hexdigest()[:12]
+    folder = pathlib.Path(tempfile.gettempdir()) / f"gonio-{name}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 class Daemon(Program):
@@ -158,13 +178,12 @@ class Daemon(Program):
     def __init__(self, folder, *bench, env=None, ready=True):
         self.folder = pathlib.Path(folder)
         self.directory = self.folder / "campaigns"
-        self.socket = self.folder / "goniod.sock"
+        self.runtime = short_folder(self.folder)  # --sim makes its run directory here
+        self.socket = self.runtime / "goniod.sock"
         self.folder.mkdir(parents=True, exist_ok=True)
         self.directory.mkdir(exist_ok=True)
-        runtime = self.folder / "runtime"  # --sim makes its run directory here
-        runtime.mkdir(exist_ok=True)
         self.env = {"GONIO_SOCKET": str(self.socket), "GONIO_DIR": str(self.directory),
-                    "XDG_RUNTIME_DIR": str(runtime), **(env or {})}
+                    "XDG_RUNTIME_DIR": str(self.runtime), **(env or {})}
         super().__init__([BUILD / "goniod", *(bench or ("--sim", "--fast"))], self.folder / "goniod.log",
                          self.env)
         if ready:
@@ -201,7 +220,7 @@ class Daemon(Program):
 
     def sim_folder(self):
         """The run directory of the simulator that --sim started."""
-        (folder,) = (self.folder / "runtime").glob("goniosim-*")
+        (folder,) = self.runtime.glob("goniosim-*")
         return folder
 
     def sim_control(self, **command):
@@ -246,7 +265,13 @@ def start_sim(tmp_path):
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory):
-    """One goniod --sim --fast for all tests of a module that leave it idle."""
-    d = Daemon(tmp_path_factory.mktemp("d"), "--sim", "--fast", "--seed", "7")
+    """One goniod for all tests of a module that leave it idle; its bench (daemon.bench) warms up at once."""
+    folder = tmp_path_factory.mktemp("d")
+    bench = Sim(folder / "bench", "--fast", "--seed", "7", *QUICK_LASER)
+    d = Daemon(folder, "--config", bench.folder / "goniod.cfg")
+    d.bench = bench
     yield d
-    assert d.end() == 0, d.errors()
+    try:
+        assert d.end() == 0, d.errors()
+    finally:
+        bench.end()

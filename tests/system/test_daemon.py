@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import select
 import signal
 import sqlite3
 import subprocess
@@ -10,9 +11,18 @@ import time
 
 import pytest
 
-from conftest import BUILD, PATIENCE_S, SMALL, Program, gonio
+from conftest import BUILD, PATIENCE_S, SMALL, Program
 
-POINTS = 3 * 33 + 4  # see SMALL; two dark and two beam readings
+TINY = """\
+campaign: {
+  name = "tiny";
+  theta_i_deg = [ 10.0, 30.0 ];
+  theta_r: { from_deg = -40.0; to_deg = 40.0; step_deg = 10.0; };
+  dense: { half_width_deg = 2.0; step_deg = 1.0; };
+  readings: { count = 2; };
+};
+"""
+LONG = TINY.replace("step_deg = 10.0", "step_deg = 1.5").replace('"tiny"', '"long"')
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +47,7 @@ def test_a_campaign_runs_to_its_end(daemon, finished):
     fits = [e for e in finished["events"] if e["event"] == "fit"]
     assert [e["last"] for e in fits].count(True) == 1 and "fit" in fits[-1]
     assert daemon.status()["run"] is None
-    state = daemon.sim_control(do="state")
-    assert "true" not in json.dumps(state.get("laser", state).get("emission", False)).lower()
+    assert daemon.bench.control(do="state")["laser"]["emission"] is False
 
 
 def test_ids_rise_and_every_event_names_its_run(finished):
@@ -48,8 +57,7 @@ def test_ids_rise_and_every_event_names_its_run(finished):
 
 
 def test_the_fit_matches_the_simulated_sample(daemon, finished):
-    truth = daemon.sim_control(do="truth")
-    truth = truth.get("sample", truth)
+    truth = daemon.bench.control(do="truth")["sample"]
     fit = [e for e in finished["events"] if e["event"] == "fit"][-1]["fit"]
     sigma = fit["params"]["sigma"]
     # Identified by f_00 alone (physics): sigma and kd. Five standard uncertainties, and never more than 5 %.
@@ -106,17 +114,16 @@ def test_the_stream_replays_what_was_missed(daemon, finished):
 
 def test_run_for_people_ends_with_the_parameters(daemon, tmp_path):
     config = tmp_path / "tiny.cfg"
-    config.write_text(SMALL.replace("0.0, 20.0, 40.0", "10.0, 30.0, 50.0").replace('"small"', '"tiny"'))
+    config.write_text(TINY)
     r = daemon.gonio("run", config)
     assert r.returncode == 0, r.stderr
-    assert "sweep 1/3" in r.stderr and "sweep 3/3" in r.stderr and "started" in r.stderr
+    assert "sweep 1/2" in r.stderr and "sweep 2/2" in r.stderr and "started" in r.stderr
     assert ".gonio" in r.stderr
     rows = {line.split("\t")[0] for line in r.stdout.splitlines()}
     assert rows >= {"n", "k", "sigma", "ks", "kd", "ks*R(0)", "Delta"}
     assert "\033" not in r.stdout + r.stderr
 
 
-LONG = SMALL.replace("step_deg = 5.0", "step_deg = 1.0").replace('"small"', '"long"')
 
 
 def test_stop_and_resume_measure_no_point_twice(daemon):
@@ -150,7 +157,7 @@ def test_stop_and_resume_measure_no_point_twice(daemon):
 
 
 def test_pause_holds_and_resume_goes_on(daemon):
-    reply = daemon.submit()
+    reply = daemon.submit(TINY)
     run = reply["run"]
     stream = daemon.follow(reply["event_id"])
     stream.until(lambda e: e["event"] == "reading" and e["done"] >= 5)
@@ -171,10 +178,10 @@ def test_pause_holds_and_resume_goes_on(daemon):
 
 
 def test_a_second_campaign_waits_and_a_stop_puts_it_back(daemon):
-    first, second = daemon.submit(LONG, "long.cfg"), daemon.submit()
+    first, second = daemon.submit(LONG, "long.cfg"), daemon.submit(TINY)
     assert daemon.status()["queued"] == [second["run"]]
     stream = daemon.follow(first["event_id"])
-    stream.until_state(first["run"], "running")
+    stream.until_state(first["run"], "preparing")
     assert daemon.request("POST", "/api/v1/stop")[0] == 200
     stream.until_state(first["run"], "stopped")
     stream.close()
@@ -207,7 +214,7 @@ def test_sigterm_in_a_run_ends_within_5_s_and_the_run_goes_on_later(start_daemon
     began = time.monotonic()
     assert d.end(signal.SIGTERM) == 0, d.errors()
     assert time.monotonic() - began < 5.0
-    assert not d.socket.exists() and not list(d.folder.glob("runtime/*"))
+    assert list(d.runtime.iterdir()) == []
     with pytest.raises(ProcessLookupError):
         os.kill(sim_pid, 0)
     (entry,) = json.loads(d.gonio("list", "--json").stdout)
@@ -219,12 +226,19 @@ def test_sigterm_in_a_run_ends_within_5_s_and_the_run_goes_on_later(start_daemon
     again.follow(0).until(lambda e: e["event"] == "reading" and e["done"] > entry["done"])
 
 
+def test_sim_needs_no_file_and_no_hardware(start_daemon):
+    d = start_daemon("--sim", "--fast", "--seed", "9")
+    assert d.said[0].startswith("goniod 0.") and "simulator (seed 9)" in d.said[0] and str(d.socket) in d.said[0]
+    s = d.status()
+    assert s["simulator"] is True and s["seed"] == 9
+    assert d.sim_control(do="truth")["seed"] == 9
+
+
 def test_the_simulator_dies_with_a_killed_daemon(start_daemon):
     d = start_daemon("--sim", "--fast")
     sim_pid = int((d.sim_folder() / "goniosim.pid").read_text())
     pidfd = os.pidfd_open(sim_pid)
     d.end(signal.SIGKILL)
-    import select
     assert select.select([pidfd], [], [], PATIENCE_S)[0], "goniosim outlived its daemon"
     os.close(pidfd)
     again = start_daemon("--sim", "--fast")  # the dead daemon's socket is replaced
@@ -240,7 +254,7 @@ def test_a_second_daemon_is_refused(daemon):
 def test_the_daemon_over_tcp_and_a_given_simulator(start_sim, start_daemon):
     sim = start_sim("--fast")
     d = start_daemon("--config", sim.folder / "goniod-tcp.cfg")
-    reply = d.submit()
+    reply = d.submit(TINY)
     d.follow(reply["event_id"]).until_state(reply["run"], "done")
     assert sim.control(do="state")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The daemon's HTTP: shapes, limits, replay. One simulated daemon serves all tests of this file."""
+"""The daemon's HTTP: shapes, limits, replay. One daemon serves all tests of this file."""
 import json
 import os
 import socket
@@ -30,7 +30,7 @@ def raw(daemon, data):
 
 def test_status_has_devices_and_no_run(daemon):
     s = daemon.status()
-    assert s["simulator"] is True and s["seed"] == 7 and s["pid"] == daemon.pid
+    assert s["pid"] == daemon.pid and s["state"] == "idle"
     assert s["run"] is None and s["queued"] == []
     devices = {d["name"]: d for d in s["devices"]}
     assert set(devices) == {"theta_i", "theta_r", "sample", "laser", "detector"}
@@ -82,11 +82,10 @@ def test_nothing_to_pause_or_resume_is_a_conflict(daemon):
 
 
 def test_a_stop_with_nothing_to_stop_halts_all_the_same(daemon):
-    before = daemon.sim_control(do="state")
+    before = daemon.bench.control(do="state")["laser"]["offs"]
     status, reply = daemon.request("POST", "/api/v1/stop")
     assert status == 200 and reply["run"] is None
-    after = daemon.sim_control(do="state")
-    assert after != before  # OFF was sent once more
+    assert daemon.bench.control(do="state")["laser"]["offs"] > before
 
 
 def test_two_lengths_are_refused(daemon):
