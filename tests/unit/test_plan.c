@@ -110,6 +110,12 @@ static void directions_are_merged_in_micro_degrees(void **state)
         dense += p.points[i].dense;
     assert_int_equal(dense, 7);
     plan_clear(&p);
+    p = planned("campaign: { name = \"a\"; theta_i_deg = 50;" // 0.3 / 0.1 is a little less than 3
+                " theta_r: { from_deg = 0; to_deg = 0.3; step_deg = 0.1; }; dense: { "
+                "half_width_deg = 0; }; };",
+                NULL);
+    assert_int_equal(p.samples, 4);
+    plan_clear(&p);
 }
 
 static void skipped_points_say_why(void **state)

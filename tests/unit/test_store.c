@@ -289,6 +289,13 @@ static void closed_is_one_file_even_with_a_reader(void **state)
     assert_int_equal(store_close(s, NULL), 0);
     assert_int_equal(store_close(reader, NULL), 0);
     assert_int_equal(fixture_files(&folder), 1);
+    store_close(opened(STORE_WRITE), NULL);
+    unsigned char header[20] = "";
+    int fd = open(path, O_RDONLY);
+    assert_int_equal(read(fd, header, sizeof header), sizeof header);
+    close(fd);
+    assert_true(header[18] == 1 &&
+                header[19] == 1); // no WAL: it can be read where nothing can be written
 }
 
 static void a_second_writer_is_refused_and_told_who(void **state)
@@ -360,6 +367,116 @@ static void damage_is_named_and_nothing_is_recreated(void **state)
     assert_non_null(strstr(err.text, "keep the file"));
 }
 
+// Where no reading lies: only a check of the whole file sees it.
+static void damage_elsewhere_is_seen_before_anything_is_written(void **state)
+{
+    (void)state;
+    static char bytes[200000];
+    struct store *s =
+        created_from("campaign: { name = \"a\"; theta_i_deg = 10; theta_r: { step_deg = 0.2; };"
+                     " dense: { half_width_deg = 0; }; };");
+    struct gon_error err = {0};
+    store_close(s, NULL);
+    int fd = open(path, O_RDWR);
+    const ssize_t size = read(fd, bytes, sizeof bytes);
+    const char *kind =
+        memmem(bytes + 40000, (size_t)size - 40000, "sample", 6); // in a row of the plan
+    assert_non_null(kind);
+    assert_int_equal(
+        pwrite(fd, "\xff\xff\xff\xff\xff\xff\xff\xff", 8, (kind - bytes) / 4096 * 4096), 8);
+    close(fd);
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "keep the file"));
+}
+
+// A file system whose calls fail when told to: the usual one with another xOpen, xSync and xWrite.
+static struct {
+    sqlite3_vfs vfs, *unix_vfs;
+    sqlite3_io_methods methods[8]; // SQLite has several: with locks, without, for folders
+    const sqlite3_io_methods *original[8];
+    int opens, fail_sync, fail_write; // the failures are what the next calls return, once
+} faulty;
+
+static const sqlite3_io_methods *original(const sqlite3_file *file)
+{
+    return faulty.original[file->pMethods - faulty.methods];
+}
+
+static int faulty_sync(sqlite3_file *file, int flags)
+{
+    int rc = faulty.fail_sync;
+    faulty.fail_sync = SQLITE_OK;
+    return rc ? rc : original(file)->xSync(file, flags);
+}
+
+static int faulty_write(sqlite3_file *file, const void *data, int size, sqlite3_int64 at)
+{
+    int rc = faulty.fail_write;
+    faulty.fail_write = SQLITE_OK;
+    return rc ? rc : original(file)->xWrite(file, data, size, at);
+}
+
+static const sqlite3_io_methods *wrapped(const sqlite3_io_methods *methods)
+{
+    int k = 0;
+    while (faulty.original[k] && faulty.original[k] != methods)
+        k++;
+    faulty.original[k] = methods;
+    faulty.methods[k] = *methods;
+    faulty.methods[k].xSync = faulty_sync;
+    faulty.methods[k].xWrite = faulty_write;
+    return &faulty.methods[k];
+}
+
+static int faulty_open(sqlite3_vfs *vfs, const char *name, sqlite3_file *file, int flags,
+                       int *ret_flags)
+{
+    (void)vfs;
+    int rc = faulty.unix_vfs->xOpen(faulty.unix_vfs, name, file, flags, ret_flags);
+    if (rc == SQLITE_OK && file->pMethods) {
+        file->pMethods = wrapped(file->pMethods);
+        faulty.opens += (flags & SQLITE_OPEN_MAIN_DB) != 0;
+    }
+    return rc;
+}
+
+static void install_faulty(void)
+{
+    faulty.unix_vfs = sqlite3_vfs_find(NULL);
+    faulty.vfs = *faulty.unix_vfs;
+    faulty.vfs.zName = "faulty";
+    faulty.vfs.xOpen = faulty_open;
+    assert_int_equal(sqlite3_vfs_register(&faulty.vfs, 1), SQLITE_OK);
+}
+
+// After a failed fsync the kernel may have dropped what was not written: the connection's idea of
+// the file is worth nothing, and it is opened and checked again before the next row.
+static void a_failed_fsync_reopens_before_the_next_row(void **state)
+{
+    (void)state;
+    const int failures[] = {SQLITE_IOERR_FSYNC, SQLITE_IOERR_WRITE, SQLITE_FULL};
+    install_faulty();
+    struct store *s = created();
+    struct gon_error err;
+    struct store_reading *rows;
+    for (int k = 0; k < 3; k++) {
+        const struct store_reading r = reading(1, k, 1);
+        const int opens = faulty.opens;
+        faulty.fail_sync = k == 0 ? failures[k] : SQLITE_OK;
+        faulty.fail_write = k > 0 ? failures[k] : SQLITE_OK;
+        assert_int_equal(store_append_reading(s, &r, &err), GON_E_STORE);
+        assert_non_null(strstr(err.text, k == 2 ? "the disk is full" : "disk I/O error"));
+        assert_int_equal(faulty.opens, opens);
+        append(s, &r);
+        assert_int_equal(faulty.opens, opens + (k < 2));
+        assert_int_equal(store_read_readings(s, -1, &rows, NULL), k + 1);
+        free(rows);
+    }
+    store_close(s, NULL);
+    sqlite3_vfs_register(faulty.unix_vfs, 1);
+    sqlite3_vfs_unregister(&faulty.vfs);
+}
+
 static void readings_cannot_be_changed_by_accident(void **state)
 {
     (void)state;
@@ -408,6 +525,8 @@ static void a_moved_file_is_noticed_at_the_next_reading(void **state)
     assert_int_equal(rename(path, away), 0);
     assert_int_equal(store_append_reading(s, &b, &err), GON_E_STORE);
     assert_non_null(strstr(err.text, "moved, removed or replaced"));
+    close(open(path, O_CREAT | O_WRONLY, 0600)); // another file in its place
+    assert_int_equal(store_append_reading(s, &b, NULL), GON_E_STORE);
     assert_int_equal(rename(away, path), 0);
     append(s, &b);
     assert_int_equal(store_read_readings(s, -1, &rows, NULL), 2);
@@ -632,6 +751,8 @@ int main(void)
         TEST(a_second_writer_is_refused_and_told_who),
         TEST(a_new_file_never_replaces_one),
         TEST(damage_is_named_and_nothing_is_recreated),
+        TEST(damage_elsewhere_is_seen_before_anything_is_written),
+        TEST(a_failed_fsync_reopens_before_the_next_row),
         TEST(readings_cannot_be_changed_by_accident),
         TEST(other_files_and_newer_ones_are_refused),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
