@@ -135,7 +135,9 @@ static void operate(struct sim_az *z, int64_t t_ns)
 static void stop(struct sim_az *z, int64_t t_ns)
 {
     world_see(z->world, t_ns);
-    motion_stop(motor(z), z->field[STOP_RATE] / z->steps_per_unit, t_ns);
+    // A return to home slows down at its own rate, not at that of the last direct operation.
+    double down = z->homing ? z->home_acceleration : z->field[STOP_RATE] / z->steps_per_unit;
+    motion_stop(motor(z), down, t_ns);
     z->homing = false;
     double rest_s = motion_left_s(motor(z), t_ns);
     z->command_steps = sim_az_position_steps(z, t_ns + (int64_t)(rest_s * 1e9) + 1);
