@@ -35,7 +35,7 @@ def assert_recovered(fit, truth):
 
 def measure(start_sim, start_daemon, config, bench, *sim_args):
     sim = start_sim(*sim_args)
-    truth = sim.control(do="truth")
+    truth = sim.control(do="truth")["sample"]
     daemon = start_daemon("--config", sim.folder / bench)
     done = daemon.gonio("run", config, "--json", patience_s=85)
     assert done.returncode == 0, (done.stderr[-2000:], daemon.errors()[-2000:])
