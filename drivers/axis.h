@@ -41,7 +41,7 @@ struct axis {
 };
 
 // Oriental Motor AZ (and its relatives with the same core map: CVD, BLV-R). The bus is borrowed. unit:
-// 1..247. status is two reads of 4 and 8 registers, 5 ms of line at 115200 baud. Speeds are 1..4,000,000
+// 1..247. status is two reads of 4 and 8 registers, 10 ms at 115200 baud with the silent gaps. Speeds are 1..4,000,000
 // steps/s, accelerations 1..1,000,000,000 steps/s2 (the controller's unit is 0.001 kHz/s, the same).
 // The bit "homed" (HOME-END) and the command position are not verified against the manual.
 struct axis *axis_az_new(struct bus *bus, int unit);

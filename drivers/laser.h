@@ -43,7 +43,7 @@ struct laser_ops {
     // GON_E_REFUSED: interlock open, key; GON_E_DEVICE: fault, or it answered that it does not want to.
     int (*on)(struct laser *l, struct gon_error *err);
     // 0 only when read back, and no start sequence goes on. Never minds the cancel token. GON_E_DEVICE:
-    // told 5 times and it still emits ("LASER MAY BE ON"). Cobolt: sent at once, confirmed 0.2 s later.
+    // told 5 times and it still emits ("LASER MAY BE ON"). Cobolt: sent at once, confirmed 0.35 s later.
     int (*off)(struct laser *l, struct gon_error *err);
     int (*reopen)(struct laser *l, struct gon_error *err);
     const char *(*fault_text)(int code);

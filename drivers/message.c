@@ -10,6 +10,7 @@
 #define COMMAND_MOST 256
 #define TRIES 3
 #define WRITE_NS CLK_MS(200) // for a command to leave
+#define DELAY_NS CLK_MS(20)  // a command may reach the device so much later than we think (USB, TCP)
 
 struct message {
     struct transport *t;
@@ -90,7 +91,9 @@ static int put(struct message *m, const char *command, struct gon_error *err)
     assert(n > 0 && (size_t)n < sizeof line);
     struct clk *clk = transport_clk(m->t);
     int rc = transport_write(m->t, line, (size_t)n, clk_now_ns(clk) + WRITE_NS, err);
-    m->ready_ns = clk_now_ns(clk) + m->format->min_gap_ns;
+    m->ready_ns = clk_now_ns(clk) + m->format->min_gap_ns; // its answer will put it right
+    if (m->format->min_gap_ns > 0)
+        m->ready_ns += DELAY_NS;
     if (rc == GON_E_LINK || rc == GON_E_CANCELED) // half a command may have left
         m->out_of_step = true;
     return rc;

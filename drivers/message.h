@@ -18,7 +18,7 @@ struct message;
 struct message_format {
     const char *end_out;    // appended to what is sent: "\r"
     const char *end_in;     // ends an answer: "\r\n"; bytes before it are the answer, blanks at its ends cut
-    int64_t min_gap_ns;     // between an answer (or a command) and the next command
+    int64_t min_gap_ns;     // between an answer and the next command; after an unanswered one 20 ms more
     int64_t timeout_ns;     // for one answer, from the last byte sent
     int64_t quiet_ns;       // silence that proves nothing more is coming: the device's largest latency
     const char *sync_query; // asked to get into step, with an answer of
