@@ -101,7 +101,9 @@ static int first_sample(struct instrument *in, const struct acquire *a, int64_t 
         return 0;
     if (instrument_wait(in, until_ns, cancel) < 0)
         return gon_fail(err, GON_E_CANCELED, "stopped while settling");
-    return sample(in, ret_sample, err);
+    unsigned overload; // that of the old signal
+    rc = instrument_condition(in, &overload, err);
+    return rc < 0 ? rc : sample(in, ret_sample, err);
 }
 
 // Saturated samples end it: more of them say nothing more.

@@ -45,8 +45,7 @@ const char *run_state_name(enum run_state s)
     return "unknown";
 }
 
-// --- what is said
-// ------------------------------------------------------------------------------------
+// --- what is said -----------------------------------------------------------------------------
 
 static double seconds_left(const struct engine *e)
 {
@@ -104,8 +103,7 @@ static void enter(struct engine *e, enum run_state state, const char *text)
     e->ports->publish(e->ports->ctx, &event);
 }
 
-// --- the safe state, and waiting in it
-// ---------------------------------------------------------------
+// --- the safe state, and waiting in it --------------------------------------------------------
 
 static int canceled(struct engine *e)
 {
@@ -215,8 +213,7 @@ static int pause_run(struct engine *e)
     return rc;
 }
 
-// --- storing
-// -----------------------------------------------------------------------------------------
+// --- storing ----------------------------------------------------------------------------------
 
 // The row is offered until it is accepted: nothing that was measured is lost, and nothing goes on
 // before.
@@ -314,8 +311,7 @@ static struct store_reading row_of(const struct engine *e, const struct acquire_
     };
 }
 
-// --- points
-// ------------------------------------------------------------------------------------------
+// --- points -----------------------------------------------------------------------------------
 
 static int prepare(struct engine *e)
 {
@@ -450,8 +446,7 @@ static void sweep_done(struct engine *e, const struct plan_point *next)
     e->ports->request_fit(e->ports->ctx, p->sweep, false);
 }
 
-// --- the run
-// -----------------------------------------------------------------------------------------
+// --- the run ----------------------------------------------------------------------------------
 
 static const struct plan_point *next_point(const struct plan *plan, const struct plan_point *after)
 {

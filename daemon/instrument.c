@@ -19,8 +19,7 @@
 static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser",
                                                    "detector"};
 
-// --- time
-// -------------------------------------------------------------------------------------------
+// --- time -------------------------------------------------------------------------------------
 
 static int64_t breathing_now_ns(const struct clk *clk)
 {
@@ -73,8 +72,7 @@ void instrument_watch(struct instrument *in, void (*watcher)(void *ctx), void *c
     in->watcher_ctx = ctx;
 }
 
-// --- links
-// ------------------------------------------------------------------------------------------
+// --- links ------------------------------------------------------------------------------------
 
 int instrument_note(struct instrument *in, enum instrument_part part, int rc, struct gon_error *err)
 {
@@ -210,8 +208,7 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
     return rc;
 }
 
-// --- construction
-// -----------------------------------------------------------------------------------
+// --- construction -----------------------------------------------------------------------------
 
 static int find_bus(const struct bench_config *bench, const char *name)
 {
@@ -358,8 +355,7 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
     }
 }
 
-// --- an instrument that runs nothing
-// -----------------------------------------------------------------
+// --- an instrument that runs nothing ----------------------------------------------------------
 
 static void ask(struct instrument *in, enum instrument_part part)
 {

@@ -137,8 +137,7 @@ bool instrument_engaged(const struct instrument *in, enum instrument_part part);
 // The position nearest to the one asked that is a whole number of steps.
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position);
 
-// --- laser: as safety.h, with the part's link kept
-// ------------------------------------------------
+// --- laser: as safety.h, with the part's link kept --------------------------------------------
 int instrument_laser(struct instrument *in, struct laser_status *ret_status, struct gon_error *err);
 // One short question: whether it says that light comes out.
 int instrument_light(struct instrument *in, bool *ret_emission, struct gon_error *err);
@@ -149,8 +148,7 @@ void instrument_permit(struct instrument *in, bool running);
 bool instrument_emission(const struct instrument *in);
 const struct safety *instrument_safety(const struct instrument *in);
 
-// --- detector
-// ---------------------------------------------------------------------------------------
+// --- detector ---------------------------------------------------------------------------------
 int instrument_ranges(const struct instrument *in);
 double instrument_full_scale_v(const struct instrument *in, int range);
 int instrument_range(const struct instrument *in); // -1: not known

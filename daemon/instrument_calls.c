@@ -4,8 +4,7 @@
 
 #include <math.h>
 
-// --- axes
-// ---------------------------------------------------------------------------------------------
+// --- axes -------------------------------------------------------------------------------------
 
 const struct bench_axis *instrument_axis(const struct instrument *in, enum instrument_part part)
 {
@@ -125,8 +124,7 @@ int instrument_halt(struct instrument *in, enum instrument_part part, struct gon
     return rc < 0 ? rc : command(in, part, in->motor[part].axis->ops->stop, err);
 }
 
-// --- laser
-// --------------------------------------------------------------------------------------------
+// --- laser ------------------------------------------------------------------------------------
 
 int instrument_laser(struct instrument *in, struct laser_status *ret_status, struct gon_error *err)
 {
@@ -200,8 +198,7 @@ const struct safety *instrument_safety(const struct instrument *in)
     return in->safety;
 }
 
-// --- detector
-// -----------------------------------------------------------------------------------------
+// --- detector ---------------------------------------------------------------------------------
 
 int instrument_ranges(const struct instrument *in)
 {

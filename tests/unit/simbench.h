@@ -53,6 +53,7 @@ struct simbench {
     // what a test wants to know
     bool emitting_last;
     int ons, offs;
+    bool no_monitor;
     bool unsettled; // somebody touched the detector's panel
     int setups;
     int nonsense; // detector answers that are not numbers, to come
@@ -364,7 +365,8 @@ static inline int simbench_detector_sample(struct detector *d, struct detector_s
         return gon_fail(err, GON_E_LINK, "answered \"nan\"");
     }
     *ret =
-        (struct detector_sample){lockin_x_v(&b->world.lockin), world_aux_v(&b->world, 1), 1000.0};
+        (struct detector_sample){lockin_x_v(&b->world.lockin),
+                                 b->no_monitor ? (double)NAN : world_aux_v(&b->world, 1), 1000.0};
     return 0;
 }
 

@@ -87,8 +87,7 @@ static inline bool is_accepted(const struct store_reading *row)
     return !(row->flags & STORE_REJECTING);
 }
 
-// --- ports
-// -------------------------------------------------------------------------------------------
+// --- ports ------------------------------------------------------------------------------------
 
 static inline bool same_row(const struct store_reading *a, const struct store_reading *b)
 {
@@ -196,8 +195,7 @@ static inline void advanced(void *ctx, int64_t t_ns)
         r->on_time(r);
 }
 
-// --- a run
-// -------------------------------------------------------------------------------------------
+// --- a run ------------------------------------------------------------------------------------
 
 static inline void add_point(struct run *r, int sweep, int point, enum plan_kind kind,
                              double theta_i, double theta_r)

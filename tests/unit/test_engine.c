@@ -10,8 +10,7 @@
 
 #include "tests/unit/simrun.h"
 
-// --- a whole campaign
-// --------------------------------------------------------------------------------
+// --- a whole campaign -------------------------------------------------------------------------
 
 static void a_campaign_measures_every_point_once_and_ends_dark(void **state)
 {
@@ -154,8 +153,7 @@ static void a_point_on_a_fast_bench_costs_40_ms(void **state)
     end(r);
 }
 
-// --- faults
-// ------------------------------------------------------------------------------------------
+// --- faults -----------------------------------------------------------------------------------
 
 // The n-th device call fails, for every n: nothing is lost, nothing twice, the light is off at the
 // end.
@@ -228,8 +226,7 @@ static void an_unplugged_device_pauses_by_name_and_resumes(void **state)
     }
 }
 
-// --- stopping and going on
-// ---------------------------------------------------------------------------
+// --- stopping and going on --------------------------------------------------------------------
 
 // As the store tells a resumed run: what is accepted is done, attempts go on counting.
 static void mark_done(struct run *r)
@@ -358,8 +355,20 @@ static void light_that_fails_is_never_a_reading(void **state)
     end(r);
 }
 
-// --- store
-// -------------------------------------------------------------------------------------------
+static void light_that_fails_is_noticed_without_a_monitor(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->b.no_monitor = true;
+    r->on_row = laser_dies_at_seventh_row;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "laser: went off by itself"));
+    end(r);
+}
+
+// --- store ------------------------------------------------------------------------------------
 
 static void a_store_that_fails_loses_nothing(void **state)
 {
@@ -379,8 +388,7 @@ static void a_store_that_fails_loses_nothing(void **state)
         }
 }
 
-// --- detector
-// ----------------------------------------------------------------------------------------
+// --- detector ---------------------------------------------------------------------------------
 
 static void glossy(struct world_spec *spec)
 {
@@ -482,8 +490,7 @@ static void nonsense_is_asked_again_and_in_the_end_somebody_is(void **state)
     end(r);
 }
 
-// --- axes
-// --------------------------------------------------------------------------------------------
+// --- axes -------------------------------------------------------------------------------------
 
 static void restart_controller_at_seventh_row(struct run *r)
 {
@@ -551,6 +558,7 @@ int main(void)
         cmocka_unit_test(an_operators_pause_is_dark_until_resumed),
         cmocka_unit_test(an_open_interlock_waits_for_somebody),
         cmocka_unit_test(light_that_fails_is_never_a_reading),
+        cmocka_unit_test(light_that_fails_is_noticed_without_a_monitor),
         cmocka_unit_test(a_store_that_fails_loses_nothing),
         cmocka_unit_test(a_glossy_peak_ranges_again_and_keeps_every_attempt),
         cmocka_unit_test(saturation_on_the_last_range_asks_somebody),
