@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// One motor axis, in steps. Units, limits, backlash and meaning live above (daemon/instrument.h); the
-// driver does I/O. No call waits for motion; each is one or two transactions. Thread: instrument.
+// One motor axis, in steps. Units, limits, backlash and meaning live above (daemon/instrument.h);
+// the driver does I/O. No call waits for motion; each is one or two transactions. Thread:
+// instrument.
 //
 // move_abs is never repeated by a driver: when its answer is lost, the caller reads the status and
 // decides. stop may be repeated and is.
@@ -15,18 +16,18 @@ struct bus;
 
 struct axis_status {
     int32_t position_steps; // encoder
-    int32_t target_steps;   // at rest: its command position; while it moves: where the last move that it
-                            // acknowledged leads, or without one where its profile is now
+    int32_t target_steps; // at rest: its command position; while it moves: where the last move that
+                          // it acknowledged leads, or without one where its profile is now
     bool moving, in_position, ready, homed;
     bool alarm;
     int alarm_code; // 0: none; the text is in alarm_text
 };
 
 struct axis_ops {
-    // Talks to the unit and checks that it is one; also takes back command bits that somebody left set.
+    // Talks to the unit and checks that it is one; also takes back command bits left set.
     int (*identify)(struct axis *a, struct gon_error *err);
     int (*status)(struct axis *a, struct axis_status *ret_status, struct gon_error *err);
-    // GON_E_INPUT for a speed or acceleration outside the controller's range; nothing was sent then.
+    // GON_E_INPUT, and nothing sent, for a speed or acceleration outside the controller's range.
     int (*move_abs)(struct axis *a, int32_t position_steps, int32_t speed_steps_per_s,
                     int32_t acceleration_steps_per_s2, struct gon_error *err);
     int (*stop)(struct axis *a, struct gon_error *err);
@@ -40,8 +41,9 @@ struct axis {
     const struct axis_ops *ops; // first member of each driver's own struct
 };
 
-// Oriental Motor AZ (and its relatives with the same core map: CVD, BLV-R). The bus is borrowed. unit:
-// 1..247. status is two reads of 4 and 8 registers, 10 ms at 115200 baud with the silent gaps. Speeds are 1..4,000,000
-// steps/s, accelerations 1..1,000,000,000 steps/s2 (the controller's unit is 0.001 kHz/s, the same).
-// The bit "homed" (HOME-END) and the command position are not verified against the manual.
+// Oriental Motor AZ (and its relatives with the same core map: CVD, BLV-R). The bus is borrowed.
+// unit: 1..247. status is two reads of 4 and 8 registers, 10 ms at 115200 baud with the silent
+// gaps. Speeds are 1..4,000,000 steps/s, accelerations 1..1,000,000,000 steps/s2 (the controller's
+// unit is 0.001 kHz/s, the same). The bit "homed" (HOME-END) and the command position are not
+// verified against the manual.
 struct axis *axis_az_new(struct bus *bus, int unit);

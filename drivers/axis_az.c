@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Registers of the Oriental Motor AZ series (HM-60252J, HM-60262E as cited by public drivers; [S] seen in
-// such a source, [M] general knowledge, to be checked against the manual). 32-bit values: upper word at
-// the lower address, both words in one transaction.
+// Registers of the Oriental Motor AZ series (HM-60252J, HM-60262E as cited by public drivers; [S]
+// seen in such a source, [M] general knowledge, to be checked against the manual). 32-bit values:
+// upper word at the lower address, both words in one transaction.
 #include "drivers/axis.h"
 
 #include "drivers/bus.h"
@@ -21,7 +21,13 @@ enum {
 };
 
 enum { ZHOME = 1 << 4, STOP = 1 << 5 }; // of COMMAND, default assignment [S]
-enum { HOME_END = 1 << 4 /* [M] */, READY = 1 << 5, ALM_A = 1 << 7, MOVE = 1 << 13, IN_POS = 1 << 14 };
+enum {
+    HOME_END = 1 << 4 /* [M] */,
+    READY = 1 << 5,
+    ALM_A = 1 << 7,
+    MOVE = 1 << 13,
+    IN_POS = 1 << 14
+};
 
 enum { ABSOLUTE = 1, FULL_CURRENT = 1000, START = 1 };
 enum { SPEED_MOST = 4000000, ACCELERATION_MOST = 1000000000 };
@@ -53,10 +59,10 @@ static void put_pair(uint16_t *r, int32_t value)
     r[1] = (uint16_t)value;
 }
 
-// --- reading ----------------------------------------------------------------------------------------
+// --- reading -------------------------------------------------------------------------------------
 
-// While it moves, the command position is where its profile is, not where it leads: then the target is
-// that of the last move that was acknowledged.
+// While it moves, the command position is where its profile is, not where it leads: then the target
+// is that of the last move that was acknowledged.
 static void decode(const struct az *z, const uint16_t *output, const uint16_t *position,
                    struct axis_status *s)
 {
@@ -88,7 +94,7 @@ static int status(struct axis *a, struct axis_status *ret_status, struct gon_err
     return rc;
 }
 
-// --- commands ---------------------------------------------------------------------------------------
+// --- commands ------------------------------------------------------------------------------------
 
 // What must arrive and may be repeated: clearing a bit is harmless.
 static int write_until_done(const struct az *z, int address, int count, const uint16_t *registers,
@@ -129,19 +135,21 @@ static int move_abs(struct axis *a, int32_t position_steps, int32_t speed_steps_
     struct az *z = az_of(a);
     if (speed_steps_per_s < 1 || speed_steps_per_s > SPEED_MOST || acceleration_steps_per_s2 < 1 ||
         acceleration_steps_per_s2 > ACCELERATION_MOST)
-        return gon_fail(err, GON_E_INPUT,
-                        "unit %d: %ld steps/s, %ld steps/s2; allowed: 1..%d steps/s, 1..%d steps/s2",
-                        z->unit, (long)speed_steps_per_s, (long)acceleration_steps_per_s2, SPEED_MOST,
-                        ACCELERATION_MOST);
+        return gon_fail(
+            err, GON_E_INPUT,
+            "unit %d: %ld steps/s, %ld steps/s2; allowed: 1..%d steps/s, 1..%d steps/s2", z->unit,
+            (long)speed_steps_per_s, (long)acceleration_steps_per_s2, SPEED_MOST,
+            ACCELERATION_MOST);
     // Rates are in 0.001 kHz/s [M], which is 1 step/s2.
-    const int32_t fields[] = {0,  ABSOLUTE, position_steps, speed_steps_per_s, acceleration_steps_per_s2,
-                              acceleration_steps_per_s2, FULL_CURRENT, START};
+    const int32_t rate = acceleration_steps_per_s2;
+    const int32_t fields[] = {0,    ABSOLUTE, position_steps, speed_steps_per_s,
+                              rate, rate,     FULL_CURRENT,   START};
     enum { FIELDS = sizeof fields / sizeof fields[0] };
     uint16_t registers[2 * FIELDS];
     for (int i = 0; i < FIELDS; i++)
         put_pair(registers + 2 * i, fields[i]);
     z->moved = false;
-    int rc = z->edge_left ? clear_command(z, err) : 0; // a STOP that stayed set would forbid the move
+    int rc = z->edge_left ? clear_command(z, err) : 0; // a STOP left set would forbid the move
     if (rc == 0)
         rc = bus_write(z->bus, z->unit, DIRECT, 2 * FIELDS, registers, err);
     if (rc < 0)
@@ -181,7 +189,7 @@ static int reset_alarm(struct axis *a, struct gon_error *err)
     return rc < 0 ? rc : cleared;
 }
 
-// The upper words are always 0 and alarms are one byte: another kind of unit hardly looks like that.
+// The upper words are always 0 and alarms are one byte: another kind of unit hardly looks so.
 static int identify(struct axis *a, struct gon_error *err)
 {
     struct az *z = az_of(a);
@@ -191,14 +199,15 @@ static int identify(struct axis *a, struct gon_error *err)
     if (rc < 0)
         return rc;
     if (output[0] != 0 || output[2] != 0 || output[3] > ALARM_MOST)
-        return gon_fail(err, GON_E_DEVICE,
-                        "%s: unit %d does not look like an AZ driver (%04X %04X %04X %04X at 007Eh)",
-                        bus_link(z->bus), z->unit, output[0], output[1], output[2], output[3]);
+        return gon_fail(
+            err, GON_E_DEVICE,
+            "%s: unit %d does not look like an AZ driver (%04X %04X %04X %04X at 007Eh)",
+            bus_link(z->bus), z->unit, output[0], output[1], output[2], output[3]);
     rc = status(a, &s, err);
     return rc < 0 ? rc : clear_command(z, err);
 }
 
-// --- alarms -----------------------------------------------------------------------------------------
+// --- alarms --------------------------------------------------------------------------------------
 
 static const struct {
     int code;
@@ -263,6 +272,7 @@ struct axis *axis_az_new(struct bus *bus, int unit)
     struct az *z = calloc(1, sizeof *z);
     if (!z)
         return NULL;
-    *z = (struct az){.axis = {&ops}, .bus = bus, .unit = unit, .edge_left = true, .reset_left = true};
+    *z = (struct az){
+        .axis = {&ops}, .bus = bus, .unit = unit, .edge_left = true, .reset_left = true};
     return &z->axis;
 }

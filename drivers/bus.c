@@ -32,7 +32,8 @@ struct request {
     const uint16_t *registers; // writing
 };
 
-// 3.5 characters of 11 bits, but never less than 1.75 ms (the standard's fixed value above 19200 baud).
+// 3.5 characters of 11 bits, but never less than 1.75 ms (the standard's fixed value above 19200
+// baud).
 static int64_t silent_gap_ns(const struct link *l)
 {
     if (!l->serial)
@@ -41,8 +42,8 @@ static int64_t silent_gap_ns(const struct link *l)
     return gap_ns > GAP_LEAST_NS ? gap_ns : GAP_LEAST_NS;
 }
 
-int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk, const struct cancel *cancel,
-             struct bus **ret_bus, struct gon_error *err)
+int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
+             const struct cancel *cancel, struct bus **ret_bus, struct gon_error *err)
 {
     struct link l;
     int rc = link_parse(link, LINK_MODBUS, &l, err);
@@ -117,8 +118,9 @@ static enum master_outcome carry_out(struct bus *b, const struct request *r)
 {
     const int64_t begin_ns = clk_now_ns(b->clk);
     enum master_outcome o =
-        r->registers ? modbus_master_write(b->master, r->unit, r->address, r->count, r->registers)
-                     : modbus_master_read(b->master, r->unit, r->address, r->count, r->ret_registers);
+        r->registers
+            ? modbus_master_write(b->master, r->unit, r->address, r->count, r->registers)
+            : modbus_master_read(b->master, r->unit, r->address, r->count, r->ret_registers);
     const int64_t end_ns = clk_now_ns(b->clk);
     b->ready_ns = end_ns + b->gap_ns;
     b->stats.requests++;
@@ -159,7 +161,8 @@ static int attempt(struct bus *b, const struct request *r, enum master_outcome *
             return 0;
         }
         if (clk_sleep(b->clk, wait_ns, cancel) < 0)
-            return gon_fail(err, GON_E_CANCELED, "%s: stopped while unit %d is busy", bus_link(b), r->unit);
+            return gon_fail(err, GON_E_CANCELED, "%s: stopped while unit %d is busy", bus_link(b),
+                            r->unit);
     }
 }
 
@@ -184,17 +187,19 @@ static int say(const struct bus *b, const struct request *r, enum master_outcome
     const char *verb = r->registers ? "writing" : "reading";
     const int function = r->registers ? 16 : 3;
     if (o == MASTER_GONE)
-        return gon_fail(err, GON_E_GONE, "%s: hung up while %s unit %d", bus_link(b), verb, r->unit);
+        return gon_fail(err, GON_E_GONE, "%s: hung up while %s unit %d", bus_link(b), verb,
+                        r->unit);
     if (o < MASTER_SILENT)
         return gon_fail(err, GON_E_DEVICE,
-                        "%s: unit %d %s (exception %d; function %d, %d registers at %04Xh)", bus_link(b),
-                        r->unit, exception_text((int)o), (int)o, function, r->count,
+                        "%s: unit %d %s (exception %d; function %d, %d registers at %04Xh)",
+                        bus_link(b), r->unit, exception_text((int)o), (int)o, function, r->count,
                         (unsigned)r->address);
-    return gon_fail(err, GON_E_LINK, "%s: unit %d %s (%s %d registers at %04Xh; %d %s, %d ms each)%s",
-                    bus_link(b), r->unit,
+    return gon_fail(err, GON_E_LINK,
+                    "%s: unit %d %s (%s %d registers at %04Xh; %d %s, %d ms each)%s", bus_link(b),
+                    r->unit,
                     o == MASTER_SILENT ? "does not answer" : "answers what cannot be trusted", verb,
-                    r->count, (unsigned)r->address, tries, tries == 1 ? "try" : "tries", b->timeout_ms,
-                    r->registers ? "; it may have been carried out" : "");
+                    r->count, (unsigned)r->address, tries, tries == 1 ? "try" : "tries",
+                    b->timeout_ms, r->registers ? "; it may have been carried out" : "");
 }
 
 int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_registers,

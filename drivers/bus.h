@@ -3,18 +3,18 @@
 //
 //   modbus-rtu:/dev/serial/by-id/...?baud=115200&parity=E&stop=1     modbus-tcp:host:port
 //
-// libmodbus can return the previous register's value after a late or doubled reply on RTU. So: flush
-// before each request; after any error that is not an exception answer, drain until the line was quiet
-// for quiet_ms; keep the silent gap (3.5 characters, at least 1.75 ms: Modbus over Serial Line 1.02,
-// 2.5.1.1); and callers give neighbouring reads different lengths, so that a stale reply fails its
-// length check. TCP is closed and reconnected after any such error. Link recovery inside libmodbus
-// stays off (it never returns once a device is gone). A write that timed out may have been carried out:
-// nothing here repeats one.
+// libmodbus can return the previous register's value after a late or doubled reply on RTU. So:
+// flush before each request; after any error that is not an exception answer, drain until the line
+// was quiet for quiet_ms; keep the silent gap (3.5 characters, at least 1.75 ms: Modbus over Serial
+// Line 1.02, 2.5.1.1); and callers give neighbouring reads different lengths, so that a stale reply
+// fails its length check. TCP is closed and reconnected after any such error. Link recovery inside
+// libmodbus stays off (it never returns once a device is gone). A write that timed out may have
+// been carried out: nothing here repeats one.
 //
-// An answer takes at most timeout_ms, during which nothing else happens; all other waits give the clock
-// its turn. Writes (STOP is one) go out whatever was cancelled. A pty has no parity: there it is not
-// set. Descriptors of 1024 and more are refused (libmodbus uses select): open buses early. Thread: the
-// one that opened it.
+// An answer takes at most timeout_ms, during which nothing else happens; all other waits give the
+// clock its turn. Writes (STOP is one) go out whatever was cancelled. A pty has no parity: there it
+// is not set. Descriptors of 1024 and more are refused (libmodbus uses select): open buses early.
+// Thread: the one that opened it.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -31,18 +31,18 @@ struct bus_stats {
 
 // timeout_ms: of one answer, 10..200 (the laser's lease allows no longer silence); quiet_ms: the
 // slowest answer a unit was ever seen to give, 20..1000.
-int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk, const struct cancel *cancel,
-             struct bus **ret_bus, struct gon_error *err);
+int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
+             const struct cancel *cancel, struct bus **ret_bus, struct gon_error *err);
 void bus_close(struct bus *b);
 int bus_reopen(struct bus *b, struct gon_error *err); // one try
 
 // Holding registers, function 3. Reads are repeated up to 3 times after resynchronising.
-// GON_E_LINK, GON_E_GONE; GON_E_DEVICE for an exception answer (text says which; busy is waited out, up
-// to 1 s). unit 1..247, count 1..125.
+// GON_E_LINK, GON_E_GONE; GON_E_DEVICE for an exception answer (text says which; busy is waited
+// out, up to 1 s). unit 1..247, count 1..125.
 int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_registers,
              struct gon_error *err);
-// Function 16. Sent once; an answer "busy" means that it was not carried out, so then it is sent again.
-// count 1..123.
+// Function 16. Sent once; an answer "busy" means that it was not carried out, so then it is sent
+// again. count 1..123.
 int bus_write(struct bus *b, int unit, int address, int count, const uint16_t *registers,
               struct gon_error *err);
 const char *bus_link(const struct bus *b);

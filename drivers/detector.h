@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// One detector chain: signal and, where wired, the reference monitor, read in one transaction. A value
-// never travels without its flags; a reading that is not a number is an error, never a number. The
-// driver does I/O; averaging, ranging and settling rules live above (daemon/acquire.h). Thread: instrument.
+// One detector chain: signal and, where wired, the reference monitor, read in one transaction. A
+// value never travels without its flags; a reading that is not a number is an error, never a
+// number. The driver does I/O; averaging, ranging and settling rules live above (daemon/acquire.h).
+// Thread: instrument.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -12,16 +13,16 @@
 
 struct detector;
 
-// Time until a step of the light has died away to residual (0..1, of the step) behind slope_db / 6 equal
-// poles (6, 12, 18, 24 dB per octave), for use with any time constant. 0 for a residual of 1 and more;
-// NAN for another slope or a residual of 0 and less.
+// Time until a step of the light has died away to residual (0..1, of the step) behind slope_db / 6
+// equal poles (6, 12, 18, 24 dB per octave), for use with any time constant. 0 for a residual of 1
+// and more; NAN for another slope or a residual of 0 and less.
 double detector_settle_s(double time_constant_s, int slope_db, double residual);
 
 enum detector_flag {
-    DETECTOR_SATURATED = 1 << 0,   // input, filter or output overload, or >= 0.95 of full scale
-    DETECTOR_UNLOCKED = 1 << 1,    // reference lost
-    DETECTOR_UNSETTLED = 1 << 2    // something changed the filter or the range, or the device restarted:
-                                   // the settling time no longer holds; set it up again
+    DETECTOR_SATURATED = 1 << 0, // input, filter or output overload, or >= 0.95 of full scale
+    DETECTOR_UNLOCKED = 1 << 1,  // reference lost
+    DETECTOR_UNSETTLED = 1 << 2  // something changed the filter or the range, or the device
+                                // restarted: the settling time no longer holds; set it up again
 };
 
 struct detector_sample {
@@ -55,12 +56,12 @@ struct detector {
     const struct detector_ops *ops; // first member of each driver's own struct
 };
 
-// SRS SR830 over RS-232. Opens the link only; call identify and setup next. Queries are repeated up to 3
-// times when the link fails; nothing takes longer than 0.3 s without giving the clock its turn.
+// SRS SR830 over RS-232. Opens the link only; call identify and setup next. Queries are repeated up
+// to 3 times when the link fails; every wait gives the clock its turn at least every 50 ms.
 //  - setup chooses the shortest time constant that is not below the one asked, and leaves reserve,
 //    coupling, phase and reference as the operator set them;
-//  - sample is one SNAP?: in-phase, frequency and monitor of one moment. Every other time it asks for one
-//    number more, so that a late or doubled answer to the one before does not fit;
+//  - sample is one SNAP?: in-phase, frequency and monitor of one moment. Every other
+//    time it asks for one number more, so that a late or doubled answer to the one before does not fit;
 //  - condition also reads the sensitivity back: somebody at the front panel is DETECTOR_UNSETTLED.
 int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *cancel,
                         struct detector **ret_detector, struct gon_error *err);

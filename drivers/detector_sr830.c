@@ -19,12 +19,14 @@
 static const double full_scale_v[] = {2e-9, 5e-9, 1e-8, 2e-8, 5e-8, 1e-7, 2e-7, 5e-7, 1e-6,
                                       2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3,
                                       2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1,  0.2,  0.5,  1.0}; // SENS
-static const double time_constant_s[] = {1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3,
-                                         1.0,  3.0,  10,   30,   100,  300,  1e3,  3e3,  1e4, 3e4}; // OFLT
+static const double time_constant_s[] = {1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2,
+                                         3e-2, 0.1,  0.3,  1.0,  3.0,  10,   30,
+                                         100,  300,  1e3,  3e3,  1e4,  3e4}; // OFLT
 enum { RANGES = sizeof full_scale_v / sizeof full_scale_v[0] };
 enum { CONSTANTS = sizeof time_constant_s / sizeof time_constant_s[0] };
 
-// LIAS?: b0 input or reserve, b1 filter, b2 output, b3 reference unlocked, b4 its range, b5 time constant.
+// LIAS?: b0 input or reserve, b1 filter, b2 output, b3 reference unlocked, b4 its range, b5 time
+// constant.
 enum { LIAS_OVERLOAD = 0x07, LIAS_UNLOCKED = 0x08, LIAS_CHANGED = 0x30 };
 // *ESR?: b4 bad parameter, b5 illegal command, b7 power on.
 enum { ESR_REFUSED = 0x30, ESR_POWER_ON = 0x80 };
@@ -57,9 +59,10 @@ static struct sr830 *sr_of(struct detector *d)
     return (struct sr830 *)d;
 }
 
-// --- settings ---------------------------------------------------------------------------------------
+// --- settings ------------------------------------------------------------------------------------
 
-static int ask_int(struct sr830 *z, const char *query, int most, int *ret_value, struct gon_error *err)
+static int ask_int(struct sr830 *z, const char *query, int most, int *ret_value,
+                   struct gon_error *err)
 {
     double value = (double)NAN;
     int rc = message_ask_number(z->m, query, &value, err);
@@ -123,10 +126,11 @@ static int setup(struct detector *d, const struct detector_setup *s, double *ret
         i++;
     if (!(s->time_constant_s > 0) || i == CONSTANTS || s->slope_db % 6 || s->slope_db < 6 ||
         s->slope_db > 24 || s->monitor_aux < 0 || s->monitor_aux > 4)
-        return gon_fail(err, GON_E_INPUT,
-                        "SR830: time constant %g s, slope %d dB, monitor input %d; allowed: up to 30000 s; "
-                        "6, 12, 18, 24 dB; 1..4 or 0 for none",
-                        s->time_constant_s, s->slope_db, s->monitor_aux);
+        return gon_fail(
+            err, GON_E_INPUT,
+            "SR830: time constant %g s, slope %d dB, monitor input %d; allowed: up to 30000 s; "
+            "6, 12, 18, 24 dB; 1..4 or 0 for none",
+            s->time_constant_s, s->slope_db, s->monitor_aux);
     int rc = message_send(z->m, "*CLS", err);
     if (rc == 0)
         rc = set(z, "OFLT", i, CONSTANTS - 1, err);
@@ -166,7 +170,7 @@ static int set_range(struct detector *d, int range, struct gon_error *err)
     return rc;
 }
 
-// --- readings ---------------------------------------------------------------------------------------
+// --- readings ------------------------------------------------------------------------------------
 
 // What a SNAP? was asked for, and room for the answer.
 struct snap {
@@ -241,14 +245,16 @@ static int condition(struct detector *d, unsigned *ret_flags, struct gon_error *
         rc = ask_int(z, "SENS?", RANGES - 1, &range, err);
     if (rc < 0)
         return rc;
-    const bool changed = lias & LIAS_CHANGED || z->restarted || (z->range >= 0 && range != z->range);
+    const bool changed =
+        lias & LIAS_CHANGED || z->restarted || (z->range >= 0 && range != z->range);
     *ret_flags = (lias & LIAS_OVERLOAD || z->clipped ? DETECTOR_SATURATED : 0u) |
-                 (lias & LIAS_UNLOCKED ? DETECTOR_UNLOCKED : 0u) | (changed ? DETECTOR_UNSETTLED : 0u);
+                 (lias & LIAS_UNLOCKED ? DETECTOR_UNLOCKED : 0u) |
+                 (changed ? DETECTOR_UNSETTLED : 0u);
     z->clipped = false;
     return 0;
 }
 
-// --- life -------------------------------------------------------------------------------------------
+// --- life ----------------------------------------------------------------------------------------
 
 static int sr830_reopen(struct detector *d, struct gon_error *err)
 {
@@ -267,8 +273,9 @@ static void sr830_free(struct detector *d)
 int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *cancel,
                         struct detector **ret_detector, struct gon_error *err)
 {
-    static const struct detector_ops ops = {identify, setup,     ranges,       full_scale, set_range,
-                                            sample,   condition, sr830_reopen, sr830_free};
+    static const struct detector_ops ops = {identify,   setup,        ranges,
+                                            full_scale, set_range,    sample,
+                                            condition,  sr830_reopen, sr830_free};
     struct transport *t;
     int rc = transport_open(link, clk, cancel, &t, err);
     if (rc < 0)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Cobolt 05-01 series: "cmd CR", answered by "text CR LF" (drivers cobolt-lasers/pycobolt and
-// microscope's cobolt.py). Settings answer OK; what it does not know "Syntax error...", what it refuses
-// "Error...". gom? as the 05 series counts it; the 06 series uses other numbers and is refused by
-// identify.
+// microscope's cobolt.py). Settings answer OK; what it does not know "Syntax error...", what it
+// refuses "Error...". gom? as the 05 series counts it; the 06 series uses other numbers and is
+// refused by identify.
 #include "drivers/laser.h"
 
 #include "drivers/message.h"
@@ -29,7 +29,13 @@ enum mode { // gom?
     MODES
 };
 
-enum fault { FAULT_NONE, FAULT_TEMPERATURE, FAULT_INTERLOCK = 3, FAULT_POWER = 4, FAULTS_MOST = 99 };
+enum fault {
+    FAULT_NONE,
+    FAULT_TEMPERATURE,
+    FAULT_INTERLOCK = 3,
+    FAULT_POWER = 4,
+    FAULTS_MOST = 99
+};
 
 struct cobolt {
     struct laser laser; // first
@@ -49,7 +55,7 @@ static const char *link_of(const struct cobolt *c)
     return transport_link(message_transport(c->m));
 }
 
-// --- questions --------------------------------------------------------------------------------------
+// --- questions -----------------------------------------------------------------------------------
 
 struct range {
     int most, value;
@@ -68,7 +74,8 @@ static int read_int(const char *answer, void *ctx, struct gon_error *err)
     return 0;
 }
 
-static int ask_int(struct cobolt *c, const char *query, int most, int *ret_value, struct gon_error *err)
+static int ask_int(struct cobolt *c, const char *query, int most, int *ret_value,
+                   struct gon_error *err)
 {
     struct range r = {.most = most};
     int rc = message_ask(c->m, query, read_int, &r, err);
@@ -104,7 +111,8 @@ static int tell(struct cobolt *c, const char *command, struct gon_error *err)
     if (strncasecmp(answer, "syntax error", 12) == 0 || strncasecmp(answer, "error", 5) == 0)
         return gon_fail(err, GON_E_DEVICE, "%s: refuses '%s': %s", link_of(c), command, answer);
     message_out_of_step(c->m, "not an answer to a setting");
-    return gon_fail(err, GON_E_LINK, "%s: '%s' was answered '%.80s', not OK", link_of(c), command, answer);
+    return gon_fail(err, GON_E_LINK, "%s: '%s' was answered '%.80s', not OK", link_of(c), command,
+                    answer);
 }
 
 static int identify(struct laser *l, char *ret_text, size_t size, struct gon_error *err)
@@ -121,8 +129,9 @@ static int identify(struct laser *l, char *ret_text, size_t size, struct gon_err
     if (rc < 0)
         return rc;
     if (strncasecmp(model, "syntax", 6) == 0 || strncasecmp(serial, "syntax", 6) == 0)
-        return gon_fail(err, GON_E_DEVICE, "%s: does not say its model ('%s'); is it a Cobolt laser?",
-                        link_of(c), model);
+        return gon_fail(err, GON_E_DEVICE,
+                        "%s: does not say its model ('%s'); is it a Cobolt laser?", link_of(c),
+                        model);
     if (strstr(model, "-06-"))
         return gon_fail(err, GON_E_DEVICE, "%s: model %s is of the 06 series; only 05-01 is known",
                         link_of(c), model);
@@ -133,7 +142,7 @@ static int identify(struct laser *l, char *ret_text, size_t size, struct gon_err
     return 0;
 }
 
-// --- status -----------------------------------------------------------------------------------------
+// --- status --------------------------------------------------------------------------------------
 
 // An interlock that was opened and is closed again leaves the laser in its fault until the key was
 // turned. Fault 3 without that state was latched while nothing was on: it means nothing any more.
@@ -208,7 +217,7 @@ static const char *fault_text(int code)
     }
 }
 
-// --- commands ---------------------------------------------------------------------------------------
+// --- commands ------------------------------------------------------------------------------------
 
 static int set_power(struct laser *l, double power_w, struct gon_error *err)
 {
@@ -227,8 +236,8 @@ static int set_power(struct laser *l, double power_w, struct gon_error *err)
     if (rc < 0)
         return rc;
     if (fabs(now_w - power_w) > 0.001 * power_w + 0.0001)
-        return gon_fail(err, GON_E_DEVICE, "%s: set to %g W, but reads back %g W", link_of(c), power_w,
-                        now_w);
+        return gon_fail(err, GON_E_DEVICE, "%s: set to %g W, but reads back %g W", link_of(c),
+                        power_w, now_w);
     c->setpoint_w = now_w;
     return 0;
 }
@@ -258,7 +267,8 @@ static int explain_refusal(struct cobolt *c, struct gon_error *err)
         return gon_fail(err, GON_E_REFUSED, "laser stays off: turn its key switch off and on (%s)",
                         why.text);
     if (strcasestr(why.text, "interlock"))
-        return gon_fail(err, GON_E_REFUSED, "laser stays off: the interlock is open (%s)", why.text);
+        return gon_fail(err, GON_E_REFUSED, "laser stays off: the interlock is open (%s)",
+                        why.text);
     return GON_E_DEVICE;
 }
 
@@ -284,7 +294,8 @@ static bool is_starting(int mode)
 }
 
 // One question, no repetition: in off, telling again is worth more than asking again.
-static int ask_once(struct cobolt *c, const char *query, int most, int *ret_value, struct gon_error *err)
+static int ask_once(struct cobolt *c, const char *query, int most, int *ret_value,
+                    struct gon_error *err)
 {
     char answer[120];
     struct range r = {.most = most};
@@ -312,8 +323,8 @@ static int switch_off(struct cobolt *c, const char *command, bool *ret_off, stru
     return rc;
 }
 
-// At once, even into the gap in which the laser ignores commands; then, with the gap kept, until it is
-// seen. The leading CR ends what somebody else left half-sent.
+// At once, even into the gap in which the laser ignores commands; then, with the gap kept, until it
+// is seen. The leading CR ends what somebody else left half-sent.
 static int off_unminding(struct cobolt *c, struct gon_error *err)
 {
     static const char *const commands[] = {"\rl0", "\r@cob0"};
@@ -323,10 +334,11 @@ static int off_unminding(struct cobolt *c, struct gon_error *err)
         rc = switch_off(c, commands[i % 2], &is_off, err);
     if (rc < 0 || is_off)
         return rc;
-    return gon_fail(err, GON_E_DEVICE,
-                    "%s: LASER MAY BE ON: told %d times to switch off, it still says that it emits or "
-                    "starts; use its key or the interlock",
-                    link_of(c), OFF_TRIES + 1);
+    return gon_fail(
+        err, GON_E_DEVICE,
+        "%s: LASER MAY BE ON: told %d times to switch off, it still says that it emits or "
+        "starts; use its key or the interlock",
+        link_of(c), OFF_TRIES + 1);
 }
 
 static int off(struct laser *l, struct gon_error *err)
@@ -339,7 +351,7 @@ static int off(struct laser *l, struct gon_error *err)
     return rc;
 }
 
-// --- life -------------------------------------------------------------------------------------------
+// --- life ----------------------------------------------------------------------------------------
 
 static int cobolt_reopen(struct laser *l, struct gon_error *err)
 {

@@ -78,7 +78,8 @@ static const struct setting {
     const char *name, *allowed;
     bool (*set)(struct link *l, const char *value, size_t length);
 } settings[] = {
-    {"baud=", "1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600", set_baud},
+    {"baud=", "1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600",
+     set_baud},
     {"parity=", "N, E, O", set_parity},
     {"stop=", "1, 2", set_stop},
 };
@@ -96,16 +97,18 @@ static int parse_setting(const char *text, const char *item, size_t length, stru
         return gon_fail(err, GON_E_INPUT, "link '%s': '%.*s' is not possible; allowed: %s", text,
                         (int)length, item, s->allowed);
     }
-    return gon_fail(err, GON_E_INPUT, "link '%s': unknown setting '%.*s'; known: baud, parity, stop",
-                    text, (int)length, item);
+    return gon_fail(err, GON_E_INPUT,
+                    "link '%s': unknown setting '%.*s'; known: baud, parity, stop", text,
+                    (int)length, item);
 }
 
 static int parse_serial(const char *text, const char *rest, struct link *l, struct gon_error *err)
 {
     size_t length = strcspn(rest, "?");
     if (!copy(l->place, sizeof l->place, rest, length))
-        return gon_fail(err, GON_E_INPUT, "link '%s': a path of 1 to %zu bytes must follow the colon",
-                        text, sizeof l->place - 1);
+        return gon_fail(err, GON_E_INPUT,
+                        "link '%s': a path of 1 to %zu bytes must follow the colon", text,
+                        sizeof l->place - 1);
     l->baud = 115200;
     l->stop = 1;
     for (rest += length; *rest; rest += length) {
@@ -134,7 +137,8 @@ static int parse_tcp(const char *text, const char *rest, const char *port, struc
         good = false;
     const int number = port ? whole_number(port, strlen(port)) : -1;
     if (!good || number < 1 || number > 65535)
-        return gon_fail(err, GON_E_INPUT, "link '%s': wants HOST:PORT with a port of 1..65535", text);
+        return gon_fail(err, GON_E_INPUT, "link '%s': wants HOST:PORT with a port of 1..65535",
+                        text);
     copy(l->port, sizeof l->port, port, strlen(port));
     return 0;
 }

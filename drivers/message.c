@@ -10,7 +10,7 @@
 #define COMMAND_MOST 256
 #define TRIES 3
 #define WRITE_NS CLK_MS(200) // for a command to leave
-#define DELAY_NS CLK_MS(20)  // a command may reach the device so much later than we think (USB, TCP)
+#define DELAY_NS CLK_MS(20) // a command may reach the device so much later than we think (USB, TCP)
 
 struct message {
     struct transport *t;
@@ -67,7 +67,8 @@ static const char *readable(const char *bytes, size_t size, char *out, size_t ou
     size_t used = 0;
     for (size_t i = 0; i < size && used + 5 < out_size; i++) {
         unsigned char c = (unsigned char)bytes[i];
-        used += (size_t)snprintf(out + used, out_size - used, c >= 0x20 && c < 0x7f ? "%c" : "\\x%02x", c);
+        used += (size_t)snprintf(out + used, out_size - used,
+                                 c >= 0x20 && c < 0x7f ? "%c" : "\\x%02x", c);
     }
     out[used] = 0;
     return out;
@@ -82,7 +83,7 @@ static int garbled(struct message *m, const char *command, const char *what, siz
                     readable(m->in, size, shown, sizeof shown));
 }
 
-// --- sending ----------------------------------------------------------------------------------------
+// --- sending -------------------------------------------------------------------------------------
 
 static int put(struct message *m, const char *command, struct gon_error *err)
 {
@@ -117,7 +118,7 @@ static int wait_gap(struct message *m, struct gon_error *err)
     return 0;
 }
 
-// --- one question ------------------------------------------------------------------------------------
+// --- one question --------------------------------------------------------------------------------
 
 static char *find_end(struct message *m)
 {
@@ -258,7 +259,7 @@ int message_reopen(struct message *m, struct gon_error *err)
     return 0;
 }
 
-// --- questions that may be repeated -------------------------------------------------------------------
+// --- questions that may be repeated --------------------------------------------------------------
 
 int message_ask(struct message *m, const char *command,
                 int (*read)(const char *answer, void *ctx, struct gon_error *err), void *ctx,
@@ -271,7 +272,8 @@ int message_ask(struct message *m, const char *command,
         rc = message_query(m, command, answer, sizeof answer, &why);
         if (rc == 0 && read(answer, ctx, &why)) {
             rc = message_out_of_step(m, "not what was asked");
-            gon_fail(&why, rc, "%s: '%s' was answered '%.80s'", transport_link(m->t), command, answer);
+            gon_fail(&why, rc, "%s: '%s' was answered '%.80s'", transport_link(m->t), command,
+                     answer);
         }
     }
     return rc < 0 ? gon_fail(err, rc, "%s", why.text) : 0;
@@ -282,7 +284,8 @@ static int read_number(const char *answer, void *ctx, struct gon_error *err)
     return message_number(answer, ctx, err);
 }
 
-int message_ask_number(struct message *m, const char *command, double *ret_value, struct gon_error *err)
+int message_ask_number(struct message *m, const char *command, double *ret_value,
+                       struct gon_error *err)
 {
     return message_ask(m, command, read_number, ret_value, err);
 }

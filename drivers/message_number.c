@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Numbers as instruments write them, without strtod: it follows the locale, and takes "nan" and "0x1p3".
+// Numbers as instruments write them, without strtod: it follows the locale, and takes "nan" and
+// "0x1p3".
 #include "drivers/message.h"
 
 #include <math.h>

@@ -64,7 +64,8 @@ static int reach(struct transport *t, struct gon_error *err)
         if (rc == 0)
             t->fd = transport_serial_fd(t->serial);
     } else {
-        rc = transport_tcp_connect(&t->link, t->clk, t->cancel, clk_now_ns(t->clk) + CONNECT_NS, err);
+        rc = transport_tcp_connect(&t->link, t->clk, t->cancel, clk_now_ns(t->clk) + CONNECT_NS,
+                                   err);
         if (rc >= 0)
             t->fd = rc;
     }
@@ -125,7 +126,8 @@ int transport_hung_up(struct transport *t, int error, struct gon_error *err)
                     error ? strerror(error) : "hung up");
 }
 
-int transport_slice(int fd, short events, int64_t until_ns, struct clk *clk, const struct cancel *cancel)
+int transport_slice(int fd, short events, int64_t until_ns, struct clk *clk,
+                    const struct cancel *cancel)
 {
     int64_t now_ns = clk_now_ns(clk), left_ns = until_ns - now_ns;
     if (left_ns < 0)
@@ -195,8 +197,8 @@ int transport_write(struct transport *t, const void *data, size_t size, int64_t 
         if (revents < 0)
             return revents;
         if (revents == 0)
-            return gon_fail(err, GON_E_LINK, "%s: took only %zu of %zu bytes in time", t->text, done,
-                            size);
+            return gon_fail(err, GON_E_LINK, "%s: took only %zu of %zu bytes in time", t->text,
+                            done, size);
         ssize_t n = t->link.serial ? write(t->fd, bytes + done, size - done)
                                    : send(t->fd, bytes + done, size - done, MSG_NOSIGNAL);
         int rc = moved(t, n, revents, err);
@@ -240,8 +242,8 @@ int transport_drain(struct transport *t, int64_t quiet_ns, struct gon_error *err
         dropped += rc;
         t->stats.bytes_in += (size_t)rc;
         if (clk_now_ns(t->clk) >= give_up_ns)
-            return gon_fail(err, GON_E_LINK, "%s: does not stop sending (%d bytes dropped)", t->text,
-                            dropped);
+            return gon_fail(err, GON_E_LINK, "%s: does not stop sending (%d bytes dropped)",
+                            t->text, dropped);
     }
 }
 

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 // A byte stream to one instrument: a serial port or a raw TCP connection behind the same six calls.
 //
-//   serial:/dev/serial/by-id/usb-...?baud=115200&parity=N&stop=1    libserialport; termios where it refuses (ptys)
-//   tcp:host:port                                                  as ser2net and serial servers give
+//   serial:/dev/serial/by-id/usb-...?baud=115200&parity=N&stop=1
+//                   over libserialport; termios where it refuses (ptys)
+//   tcp:host:port   as ser2net and serial servers give
 //
-// Nothing here blocks longer than its deadline: waiting is poll() on the descriptor and on the cancel
-// token, I/O is non-blocking. Waits are cut into slices of at most 50 ms, and between slices
-// clk_sleep_until(now) is called: a clock that does other work while it sleeps gets its turn. A hang-up is
-// GON_E_GONE at once, never a timeout. Ports are locked (flock and TIOCEXCL); the second opener hears
-// who has it. A pty has no parity: there it is not set. Thread: the one that opened it.
+// Nothing here blocks longer than its deadline: waiting is poll() on the descriptor and on the
+// cancel token, I/O is non-blocking. Waits are cut into slices of at most 50 ms, and between slices
+// clk_sleep_until(now) is called: a clock that does other work while it sleeps gets its turn. A
+// hang-up is GON_E_GONE at once, never a timeout. Ports are locked (flock and TIOCEXCL); the second
+// opener hears who has it. A pty has no parity: there it is not set. Thread: the one that opened
+// it.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -27,15 +29,15 @@ struct transport_stats {
 };
 
 // GON_E_INPUT: the link's text is wrong. GON_E_GONE: no such port or host. GON_E_REFUSED: in use.
-// Connecting takes at most 2 s, in slices. The name of a host is looked up, which may take longer: use
-// addresses where that matters.
+// Connecting takes at most 2 s, in slices. The name of a host is looked up, which may take longer:
+// use addresses where that matters.
 int transport_open(const char *link, struct clk *clk, const struct cancel *cancel,
                    struct transport **ret_transport, struct gon_error *err);
 // The same for a link that was parsed already; text is what it is called in messages.
 int transport_open_parsed(const struct link *link, const char *text, struct clk *clk,
                           const struct cancel *cancel, struct transport **ret_transport,
                           struct gon_error *err);
-void transport_close(struct transport *t); // also flushes nothing: whoever needs OFF sent sends it before
+void transport_close(struct transport *t); // flushes nothing: whoever needs OFF sends it before
 
 // Closes and opens again by the same name (after GON_E_GONE). One try; the caller paces retries.
 int transport_reopen(struct transport *t, struct gon_error *err);
@@ -53,7 +55,7 @@ int transport_drain(struct transport *t, int64_t quiet_ns, struct gon_error *err
 const char *transport_link(const struct transport *t);
 const struct transport_stats *transport_stats(const struct transport *t);
 
-// --- for the other modules of this layer -----------------------------------------------------------
+// --- for the other modules of this layer ---------------------------------------------------------
 int transport_fd(const struct transport *t); // -1: hung up or not reopened
 struct clk *transport_clk(const struct transport *t);
 // What must be sent whatever was cancelled (OFF, STOP) goes with NULL. Returns the token before.
@@ -61,5 +63,6 @@ const struct cancel *transport_mind(struct transport *t, const struct cancel *ca
 const struct cancel *transport_cancel(const struct transport *t);
 struct transport_stats *transport_book(struct transport *t);
 void transport_latency(struct transport *t, int64_t latency_ns); // enters one into the book
-// Whoever did I/O on transport_fd and met an error that means "gone" says so: closes, returns GON_E_GONE.
+// Whoever did I/O on transport_fd and met an error that means "gone" says so: closes, returns
+// GON_E_GONE.
 int transport_hung_up(struct transport *t, int error, struct gon_error *err);

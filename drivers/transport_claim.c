@@ -54,7 +54,8 @@ static bool has_open(const char *pid, const struct stat *file)
     return found;
 }
 
-// A process other than this one that has the device open, as far as /proc lets us look. 0: none found.
+// A process other than this one that has the device open, as far as /proc lets us look. 0: none
+// found.
 static long open_holder(const struct stat *file)
 {
     DIR *processes = opendir("/proc");
@@ -76,7 +77,8 @@ static int say_in_use(const char *path, const struct stat *file, struct gon_erro
     if (pid <= 0) // none, or one of another pid namespace
         pid = open_holder(file);
     if (pid <= 0)
-        return gon_fail(err, GON_E_REFUSED, "%s: in use by another process; end that one first", path);
+        return gon_fail(err, GON_E_REFUSED, "%s: in use by another process; end that one first",
+                        path);
     snprintf(name, sizeof name, "/proc/%ld/comm", pid);
     FILE *f = fopen(name, "re");
     if (f) {
@@ -84,8 +86,8 @@ static int say_in_use(const char *path, const struct stat *file, struct gon_erro
             comm[strcspn(comm, "\n")] = 0;
         fclose(f);
     }
-    return gon_fail(err, GON_E_REFUSED, "%s: in use by pid %ld%s%s%s; end that one first", path, pid,
-                    comm[0] ? " (" : "", comm, comm[0] ? ")" : "");
+    return gon_fail(err, GON_E_REFUSED, "%s: in use by pid %ld%s%s%s; end that one first", path,
+                    pid, comm[0] ? " (" : "", comm, comm[0] ? ")" : "");
 }
 
 int transport_claim(int fd, const char *path, struct gon_error *err)
@@ -106,11 +108,12 @@ static int say_denied(const char *path, const struct stat *file, struct gon_erro
     struct group *group = getgrgid(file->st_gid);
     struct passwd *user = getpwuid(geteuid());
     if ((file->st_mode & 060) != 060 || !group)
-        return gon_fail(err, GON_E_REFUSED, "%s: permission denied (mode %03o, owner uid %ld)", path,
-                        (unsigned)file->st_mode & 0777, (long)file->st_uid);
-    return gon_fail(err, GON_E_REFUSED,
-                    "%s: permission denied; join the group '%s': sudo usermod -aG %s %s, then log in again",
-                    path, group->gr_name, group->gr_name, user ? user->pw_name : "USER");
+        return gon_fail(err, GON_E_REFUSED, "%s: permission denied (mode %03o, owner uid %ld)",
+                        path, (unsigned)file->st_mode & 0777, (long)file->st_uid);
+    return gon_fail(
+        err, GON_E_REFUSED,
+        "%s: permission denied; join the group '%s': sudo usermod -aG %s %s, then log in again",
+        path, group->gr_name, group->gr_name, user ? user->pw_name : "USER");
 }
 
 int transport_claim_failed(const char *path, const char *name, int error, struct gon_error *err)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Who has a serial port: locking it, and saying in words why it cannot be had. Inside this layer.
-// TIOCEXCL keeps others from opening it but not root; flock keeps those out who also ask. Thread: any.
+// TIOCEXCL keeps others from opening it but not root; flock keeps those out who also ask. Any
+// thread.
 #pragma once
 #include "base/err.h"
 

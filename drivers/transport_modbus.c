@@ -20,7 +20,8 @@ struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeo
     if (!m)
         return NULL;
     // Names and settings are never used: the descriptor is given.
-    m->library = rtu ? modbus_new_rtu("/dev/null", 115200, 'N', 8, 1) : modbus_new_tcp("127.0.0.1", 502);
+    m->library =
+        rtu ? modbus_new_rtu("/dev/null", 115200, 'N', 8, 1) : modbus_new_tcp("127.0.0.1", 502);
     if (!m->library) {
         free(m);
         return NULL;
@@ -49,9 +50,10 @@ int modbus_master_attach(struct modbus_master *m, struct gon_error *err)
     if (fd < 0)
         return gon_fail(err, GON_E_GONE, "%s: not open since it hung up", transport_link(m->t));
     if (fd >= FD_SETSIZE)
-        return gon_fail(err, GON_E_SYSTEM,
-                        "%s: descriptor %d is too large for libmodbus (most %d); open fewer files before",
-                        transport_link(m->t), fd, FD_SETSIZE - 1);
+        return gon_fail(
+            err, GON_E_SYSTEM,
+            "%s: descriptor %d is too large for libmodbus (most %d); open fewer files before",
+            transport_link(m->t), fd, FD_SETSIZE - 1);
     modbus_set_socket(m->library, fd);
     return 0;
 }
@@ -96,7 +98,8 @@ enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int ad
     uint16_t registers[MODBUS_MAX_READ_REGISTERS];
     modbus_set_slave(m->library, unit);
     errno = 0;
-    enum master_outcome o = outcome(m, modbus_read_registers(m->library, address, count, registers));
+    enum master_outcome o =
+        outcome(m, modbus_read_registers(m->library, address, count, registers));
     for (int i = 0; o == MASTER_DONE && i < count; i++)
         ret_registers[i] = registers[i];
     return o;

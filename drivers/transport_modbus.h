@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // libmodbus 3.1.6 over a transport's descriptor: one request, one classified outcome. The transport
-// opens, locks and closes the descriptor (modbus_connect and modbus_close are never called: they would
-// set a pty's parity, which fails, and restore line settings that were never saved). Inside this layer.
-// Thread: the transport's.
+// opens, locks and closes the descriptor (modbus_connect and modbus_close are never called: they
+// would set a pty's parity, which fails, and restore line settings that were never saved). Inside
+// this layer. Thread: the transport's.
 #pragma once
 #include "base/err.h"
 #include "drivers/transport.h"

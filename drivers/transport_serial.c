@@ -26,7 +26,7 @@ struct serial_port {
     int fd;
 };
 
-// --- names ------------------------------------------------------------------------------------------
+// --- names ---------------------------------------------------------------------------------------
 
 // Drops "." and "x/.." textually; path is absolute.
 static void tidy(char *path)
@@ -76,7 +76,7 @@ static bool is_pty(int fd)
     return fstat(fd, &s) == 0 && major(s.st_rdev) >= PTY_FIRST && major(s.st_rdev) <= PTY_LAST;
 }
 
-// --- by libserialport -------------------------------------------------------------------------------
+// --- by libserialport ----------------------------------------------------------------------------
 
 // 0; or an errno. ENOTTY: the library refuses what may still be a terminal.
 static int library_open(const char *name, struct serial_port *p)
@@ -115,7 +115,7 @@ static int library_configure(struct sp_port *port, const struct link *l)
     return error;
 }
 
-// --- by termios -------------------------------------------------------------------------------------
+// --- by termios ----------------------------------------------------------------------------------
 
 static int plain_open(const char *name, struct serial_port *p)
 {
@@ -156,7 +156,7 @@ static int plain_configure(int fd, const struct link *l)
     return tcsetattr(fd, TCSANOW, &t) ? errno : 0;
 }
 
-// --- both -------------------------------------------------------------------------------------------
+// --- both ----------------------------------------------------------------------------------------
 
 static int configure(const struct serial_port *p, const struct link *l)
 {
@@ -185,13 +185,15 @@ static int open_port(const struct link *link, struct serial_port *p, struct gon_
         return rc;
     error = configure(p, link);
     if (error)
-        return gon_fail(err, GON_E_GONE, "%s: cannot be set to %d baud, parity %c, %d stop bits: %s",
-                        link->place, link->baud, link->parity, link->stop, strerror(error));
+        return gon_fail(err, GON_E_GONE,
+                        "%s: cannot be set to %d baud, parity %c, %d stop bits: %s", link->place,
+                        link->baud, link->parity, link->stop, strerror(error));
     tcflush(p->fd, TCIOFLUSH);
     return 0;
 }
 
-int transport_serial_open(const struct link *link, struct serial_port **ret_port, struct gon_error *err)
+int transport_serial_open(const struct link *link, struct serial_port **ret_port,
+                          struct gon_error *err)
 {
     struct serial_port *p = malloc(sizeof *p);
     if (!p)

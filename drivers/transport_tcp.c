@@ -77,6 +77,6 @@ int transport_tcp_connect(const struct link *link, struct clk *clk, const struct
     if (fd >= 0)
         return fd;
     return gon_fail(err, error == ECANCELED ? GON_E_CANCELED : GON_E_GONE,
-                    "%s port %s: %s; is it switched on and the port right?", link->place, link->port,
-                    strerror(error));
+                    "%s port %s: %s; is it switched on and the port right?", link->place,
+                    link->port, strerror(error));
 }

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Lets libserialport open ptys, for tests only: preloaded (LD_PRELOAD=libptycompat.so) or linked into a
-// test program. PTYCOMPAT names the ports: "gonio0=/path/to/pty:gonio1=/another/path"; they appear as
-// /dev/gonio0, /dev/gonio1. A path may be a symbolic link that changes; it is followed at each open.
+// Lets libserialport open ptys, for tests only: preloaded (LD_PRELOAD=libptycompat.so) or linked
+// into a test program. PTYCOMPAT names the ports: "gonio0=/path/to/pty:gonio1=/another/path"; they
+// appear as /dev/gonio0, /dev/gonio1. A path may be a symbolic link that changes; it is followed at
+// each open.
 //
 // What libserialport 0.1.1 asks of a real port and a pty does not have:
 //   /sys/class/tty/NAME exists and leads somewhere          lstat, readlink, stat, access
 //   TIOCMGET and TIOCMSET, TIOCMBIS, TIOCMBIC               kept per descriptor, DTR and RTS as set
-//   PARENB                                                  kept; a pty drops it, and tcsetattr says EINVAL
+//   PARENB                                                  kept; a pty drops it: EINVAL
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -58,7 +59,7 @@ static bool is_class(const char *path)
     return find(path, CLASS, "/sys/class/tty/", pty, sizeof pty);
 }
 
-// --- files ------------------------------------------------------------------------------------------
+// --- files ---------------------------------------------------------------------------------------
 
 static int open_any(const char *path, int flags, mode_t mode)
 {
@@ -136,7 +137,7 @@ int close(int fd)
     return REAL(close)(fd);
 }
 
-// --- terminals --------------------------------------------------------------------------------------
+// --- terminals -----------------------------------------------------------------------------------
 
 static bool is_mine(int fd)
 {

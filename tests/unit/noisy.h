@@ -1,13 +1,21 @@
 // SPDX-License-Identifier: MIT
-// A bad cable between a driver and a simulated port: answers get lost, late, doubled, cut, split, wrapped
-// in garbage or changed, at random and repeatably. Replies of one frame stay whole in the port behind it.
+// A bad cable between a driver and a simulated port: answers get lost, late, doubled, cut, split,
+// wrapped in garbage or changed, at random and repeatably. Replies of one frame stay whole in the
+// port behind it.
 #pragma once
 #include "sim/port.h"
 
 #include <string.h>
 
 enum noisy_fault {
-    NOISY_LOST, NOISY_LATE, NOISY_DOUBLED, NOISY_CUT, NOISY_SPLIT, NOISY_BEFORE, NOISY_AFTER, NOISY_CHANGED,
+    NOISY_LOST,
+    NOISY_LATE,
+    NOISY_DOUBLED,
+    NOISY_CUT,
+    NOISY_SPLIT,
+    NOISY_BEFORE,
+    NOISY_AFTER,
+    NOISY_CHANGED,
     NOISY_FAULTS
 };
 
@@ -42,7 +50,8 @@ static inline void noisy_garbage(struct noisy *n, int64_t due_ns)
 
 static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int64_t due_ns)
 {
-    unsigned fault = n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
+    unsigned fault =
+        n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
     if (n->only && !(n->only >> fault & 1))
         fault = NOISY_FAULTS;
     if (n->lose_nth > 0 && --n->lose_nth == 0)
@@ -68,7 +77,9 @@ static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int6
         port_send(&n->port, bytes, size, due_ns);
         noisy_garbage(n, due_ns);
         return;
-    case NOISY_CHANGED: bytes[noisy_roll(n, (unsigned)size)] ^= (uint8_t)(1 + noisy_roll(n, 255)); break;
+    case NOISY_CHANGED:
+        bytes[noisy_roll(n, (unsigned)size)] ^= (uint8_t)(1 + noisy_roll(n, 255));
+        break;
     default: break;
     }
     if (size > 0)

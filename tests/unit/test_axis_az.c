@@ -90,10 +90,11 @@ static void frames_are_those_of_the_register_map(void **state)
     assert_int_equal(a->ops->move_abs(a, -70000, 20000, 60000, NULL), 0);
     look(a);
     assert_int_equal(a->ops->stop(a, NULL), 0);
-    check_frame(0, (const uint8_t[]){2, 16, 0x00, 0x58, 0, 16, 32, 0, 0, 0, 0, 0, 0, 0, 1, // number, absolute
-                                     0xff, 0xfe, 0xee, 0x90, 0, 0, 0x4e, 0x20,              // position, speed
-                                     0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60,                    // rates
-                                     0, 0, 0x03, 0xe8, 0, 0, 0, 1},                         // current, trigger
+    check_frame(0, (const uint8_t[]){2,    16,   0x00, 0x58, 0, 16, 32,   0,
+                                     0,    0,    0,    0,    0, 0,  1,          // number, absolute
+                                     0xff, 0xfe, 0xee, 0x90, 0, 0,  0x4e, 0x20, // position, speed
+                                     0,    0,    0xea, 0x60, 0, 0,  0xea, 0x60, // rates
+                                     0,    0,    0x03, 0xe8, 0, 0,  0,    1},   // current, trigger
                 39);
     check_frame(1, (const uint8_t[]){2, 3, 0x00, 0x7e, 0, 4}, 6);
     check_frame(2, (const uint8_t[]){2, 3, 0x00, 0xc6, 0, 8}, 6);
@@ -160,7 +161,8 @@ static void a_move_whose_answer_was_lost_is_not_repeated(void **state)
     end(a);
 }
 
-// The bit acts on its edge and holds while it is set: it is taken back although the answers are lost.
+// The bit acts on its edge and holds while it is set: it is taken back although the answers are
+// lost.
 static void stop_stops_and_takes_its_bit_back(void **state)
 {
     (void)state;
@@ -269,7 +271,8 @@ static void another_kind_of_unit_is_refused_and_not_written_to(void **state)
     int writes = 0;
     (void)state;
     struct axis *a = begin(2), *other = axis_az_new(bus, 9), *absent = axis_az_new(bus, 10);
-    sim_modbus_add(&bench.axes_port[0], (struct sim_modbus_unit){9, read_other, write_other, &writes});
+    sim_modbus_add(&bench.axes_port[0],
+                   (struct sim_modbus_unit){9, read_other, write_other, &writes});
     assert_int_equal(other->ops->identify(other, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "unit 9 does not look like an AZ driver"));
     assert_int_equal(writes, 0);

@@ -69,7 +69,8 @@ static void slave_init(bool tcp)
     memset(&slave, 0, sizeof slave);
     sim_modbus_init(&slave.m, tcp, 0, MS(2));
     for (int u = 0; u < 2; u++) {
-        sim_modbus_add(&slave.m, (struct sim_modbus_unit){u + 1, read_named, write_named, slave.registers[u]});
+        sim_modbus_add(
+            &slave.m, (struct sim_modbus_unit){u + 1, read_named, write_named, slave.registers[u]});
         for (int i = 0; i < REGISTERS; i++)
             slave.registers[u][i] = (uint16_t)((u + 1) * 1000 + i);
     }
@@ -384,7 +385,7 @@ static void a_descriptor_too_large_for_select_is_refused(void **state)
     setrlimit(RLIMIT_NOFILE, &before);
 }
 
-// --- TCP, on a real socket ------------------------------------------------------------------------------
+// --- TCP, on a real socket -----------------------------------------------------------------------
 
 static void *serve_tcp(void *ctx)
 {
@@ -393,7 +394,9 @@ static void *serve_tcp(void *ctx)
     uint8_t bytes[300];
     for (int connections = 0;;) {
         const int64_t due_ns = port_next_ns(&slave.m.port), now_ns = clk_now_ns(clk_system());
-        const int wait_ms = due_ns == PORT_NEVER ? 20000 : due_ns > now_ns ? (int)((due_ns - now_ns) / 1000000) + 1 : 0;
+        const int wait_ms = due_ns == PORT_NEVER ? 20000
+                            : due_ns > now_ns    ? (int)((due_ns - now_ns) / 1000000) + 1
+                                                 : 0;
         poll(p, 2, wait_ms);
         if (p[0].revents & POLLIN) { // a new connection instead of the one before
             if (p[1].fd >= 0)
@@ -446,7 +449,7 @@ static void tcp_reconnects_after_a_late_answer(void **state)
     close(server);
 }
 
-// --- many readings under faults ------------------------------------------------------------------------
+// --- many readings under faults ------------------------------------------------------------------
 
 enum { READINGS = 10000, SEED = 20240917 };
 
@@ -491,8 +494,9 @@ static void no_wrong_value_under_faults(void **state)
             good++;
             wrong += !is_right(i, r);
         }
-    print_message("seed %d: %d readings, %llu faults, %d answered, %d wrong, %.0f s of bus time\n", SEED,
-                  READINGS, (unsigned long long)noisy.faults, good, wrong, (double)vline.clk.t_ns * 1e-9);
+    print_message("seed %d: %d readings, %llu faults, %d answered, %d wrong, %.0f s of bus time\n",
+                  SEED, READINGS, (unsigned long long)noisy.faults, good, wrong,
+                  (double)vline.clk.t_ns * 1e-9);
     assert_true(noisy.faults > READINGS / 20);
     assert_true(good >= READINGS - READINGS / 100);
     assert_int_equal(wrong, 0);

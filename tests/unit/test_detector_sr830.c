@@ -17,7 +17,8 @@
 
 static struct bench bench;
 static struct noisy line;
-static const struct detector_setup setup = {.time_constant_s = 0.1, .slope_db = 12, .monitor_aux = 1};
+static const struct detector_setup setup = {
+    .time_constant_s = 0.1, .slope_db = 12, .monitor_aux = 1};
 
 static struct detector *open_on(struct port *port)
 {
@@ -46,8 +47,8 @@ static struct detector *begin_ready(int range)
     double tc_s;
     char text[120];
     struct detector *d = begin();
-    if (d->ops->identify(d, text, sizeof text, &err) < 0 || d->ops->setup(d, &setup, &tc_s, &err) < 0 ||
-        d->ops->set_range(d, range, &err) < 0)
+    if (d->ops->identify(d, text, sizeof text, &err) < 0 ||
+        d->ops->setup(d, &setup, &tc_s, &err) < 0 || d->ops->set_range(d, range, &err) < 0)
         fail_msg("%s", err.text);
     return d;
 }
@@ -103,8 +104,9 @@ static void the_time_constant_is_the_next_that_is_not_shorter(void **state)
 
 static void impossible_settings_are_refused(void **state)
 {
-    static const struct detector_setup bad[] = {
-        {30001, 12, 1}, {0, 12, 1}, {-1, 12, 1}, {0.1, 13, 1}, {0.1, 0, 1}, {0.1, 30, 1}, {0.1, 12, 5}, {0.1, 12, -1}};
+    static const struct detector_setup bad[] = {{30001, 12, 1}, {0, 12, 1},   {-1, 12, 1},
+                                                {0.1, 13, 1},   {0.1, 0, 1},  {0.1, 30, 1},
+                                                {0.1, 12, 5},   {0.1, 12, -1}};
     struct gon_error err;
     (void)state;
     struct detector *d = begin_ready(26);
@@ -126,7 +128,8 @@ static void ranges_are_set_and_read_back(void **state)
     for (int range = 26; range >= 0; range--) {
         assert_int_equal(d->ops->set_range(d, range, NULL), 0);
         assert_true(bench.world.lockin.full_scale_v == d->ops->full_scale_v(d, range));
-        assert_true(range == 0 || d->ops->full_scale_v(d, range) > d->ops->full_scale_v(d, range - 1));
+        assert_true(range == 0 ||
+                    d->ops->full_scale_v(d, range) > d->ops->full_scale_v(d, range - 1));
     }
     d->ops->free(d);
 }
@@ -324,8 +327,8 @@ static void hear_and_count(struct scripted *s, const char *text, int64_t t_ns)
     char answer[80];
     const bool snap = strncmp(text, "SNAP", 4) == 0;
     asked += snap;
-    snprintf(answer, sizeof answer, "%.4f,1000.00,%.4f%s\r", 0.0001 * (asked % 90), 0.001 * (asked % 5000),
-             strstr(text, ",2") ? ",0.001" : "");
+    snprintf(answer, sizeof answer, "%.4f,1000.00,%.4f%s\r", 0.0001 * (asked % 90),
+             0.001 * (asked % 5000), strstr(text, ",2") ? ",0.001" : "");
     if (snap)
         scripted_say(s, answer, t_ns + MS(5));
     else

@@ -419,8 +419,8 @@ static void off_never_claims_what_is_not_so(void **state)
     lamp->spec.warmup_s = 0.1;
     assert_int_equal(l->ops->identify(l, text, sizeof text, &err), 0);
     line.one_in = 4;
-    line.only = 1u << NOISY_LOST | 1u << NOISY_LATE | 1u << NOISY_DOUBLED | 1u << NOISY_CUT | 1u << NOISY_SPLIT |
-                1u << NOISY_BEFORE;
+    line.only = 1u << NOISY_LOST | 1u << NOISY_LATE | 1u << NOISY_DOUBLED | 1u << NOISY_CUT |
+                1u << NOISY_SPLIT | 1u << NOISY_BEFORE;
     line.late_most_ns = MS(340);
     line.double_most_ns = MS(90);
     for (int i = 0; i < 500; i++) {

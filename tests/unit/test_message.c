@@ -24,7 +24,8 @@ static const struct message_format format = {
     .sync_begins = "counter",
 };
 
-static struct message *begin(struct scripted *s, void (*hear)(struct scripted *, const char *, int64_t),
+static struct message *begin(struct scripted *s,
+                             void (*hear)(struct scripted *, const char *, int64_t),
                              const struct cancel *cancel)
 {
     struct transport *t;
@@ -380,7 +381,7 @@ static void asking_again_is_bounded(void **state)
     message_free(m);
 }
 
-// --- many readings under faults ------------------------------------------------------------------------
+// --- many readings under faults ------------------------------------------------------------------
 
 static uint64_t dice;
 
@@ -455,15 +456,15 @@ static void no_wrong_value_under_faults(void **state)
         if (ask_bluntly(message_transport(m), &value) == 0)
             wrong_bluntly += value != s.step;
     }
-    print_message("5000 readings: %d answered, %d wrong; without protection %d wrong\n", good, wrong,
-                  wrong_bluntly);
+    print_message("5000 readings: %d answered, %d wrong; without protection %d wrong\n", good,
+                  wrong, wrong_bluntly);
     assert_int_equal(wrong, 0);
     assert_true(good > 4900);
     assert_true(wrong_bluntly > 100);
     message_free(m);
 }
 
-// --- numbers --------------------------------------------------------------------------------------------
+// --- numbers -------------------------------------------------------------------------------------
 
 static void numbers_as_instruments_write_them(void **state)
 {
@@ -496,8 +497,9 @@ static void numbers_as_instruments_write_them(void **state)
 static void what_is_no_number_is_an_error(void **state)
 {
     static const char *const bad[] = {
-        "", " ", "1,234", "1.2.3", "nan", "NAN", "inf", "-INF", "9.9e37", "9.91E37", "-9.9E+37", "1e99999",
-        "1.00W", "25.3C", "0x10", "1e", "1e+", "e5", "--1", "+-1", "1 2", "OVLD", "OK", ".", "-"};
+        "",        " ",        "1,234",   "1.2.3", "nan",   "NAN",  "inf", "-INF", "9.9e37",
+        "9.91E37", "-9.9E+37", "1e99999", "1.00W", "25.3C", "0x10", "1e",  "1e+",  "e5",
+        "--1",     "+-1",      "1 2",     "OVLD",  "OK",    ".",    "-"};
     (void)state;
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         double value = 42;

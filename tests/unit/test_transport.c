@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: drivers base
-// Links on real ptys and sockets. The shim is linked in, so that libserialport itself opens a pty where a
-// test names it in PTYCOMPAT; everywhere else it passes through.
+// Links on real ptys and sockets. The shim is linked in, so that libserialport itself opens a pty
+// where a test names it in PTYCOMPAT; everywhere else it passes through.
 #include "drivers/link.h"
 #include "drivers/transport.h"
 #include "drivers/transport_port.h"
@@ -27,7 +27,7 @@ static int64_t in(int64_t ns)
     return clk_now_ns(clk_system()) + ns;
 }
 
-// --- link texts -----------------------------------------------------------------------------------------
+// --- link texts ----------------------------------------------------------------------------------
 
 static void links_are_taken_apart(void **state)
 {
@@ -36,7 +36,8 @@ static void links_are_taken_apart(void **state)
     assert_int_equal(link_parse("serial:/dev/ttyUSB0", LINK_TEXT, &l, NULL), 0);
     assert_true(l.serial && l.baud == 115200 && l.parity == 'N' && l.stop == 1);
     assert_string_equal(l.place, "/dev/ttyUSB0");
-    assert_int_equal(link_parse("modbus-rtu:/dev/x?stop=2&baud=9600&parity=O", LINK_MODBUS, &l, NULL), 0);
+    assert_int_equal(
+        link_parse("modbus-rtu:/dev/x?stop=2&baud=9600&parity=O", LINK_MODBUS, &l, NULL), 0);
     assert_true(l.serial && l.baud == 9600 && l.parity == 'O' && l.stop == 2);
     assert_int_equal(link_parse("modbus-rtu:/dev/x", LINK_MODBUS, &l, NULL), 0);
     assert_true(l.parity == 'E');
@@ -88,7 +89,7 @@ static void wrong_links_say_what_is_allowed(void **state)
     }
 }
 
-// --- ptys -----------------------------------------------------------------------------------------------
+// --- ptys ----------------------------------------------------------------------------------------
 
 struct line {
     int master;
@@ -259,7 +260,8 @@ static int open_as_nobody(const char *link, const char *said)
         struct gon_error err = {0};
         if (setgroups(0, NULL) || setresgid(65534, 65534, 65534) || setresuid(65534, 65534, 65534))
             _exit(2);
-        if (strstr(said, "in use") && (open(strchr(link, ':') + 1, O_RDWR | O_NOCTTY) >= 0 || errno != EBUSY))
+        if (strstr(said, "in use") &&
+            (open(strchr(link, ':') + 1, O_RDWR | O_NOCTTY) >= 0 || errno != EBUSY))
             _exit(3);
         int rc = transport_open(link, clk_system(), NULL, &t, &err);
         _exit(rc == GON_E_REFUSED && strstr(err.text, said) ? 0 : 1);
@@ -277,7 +279,8 @@ static void permission_denied_says_which_group_to_join(void **state)
     struct line l = line_new();
     assert_int_equal(chown(l.slave, 0, group->gr_gid), 0);
     assert_int_equal(chmod(l.slave, 0660), 0);
-    assert_int_equal(open_as_nobody(l.link, "join the group 'dialout': sudo usermod -aG dialout nobody"), 0);
+    assert_int_equal(
+        open_as_nobody(l.link, "join the group 'dialout': sudo usermod -aG dialout nobody"), 0);
     assert_int_equal(chmod(l.slave, 0600), 0);
     assert_int_equal(open_as_nobody(l.link, "permission denied (mode 600"), 0);
     assert_int_equal(chmod(l.slave, 0666), 0);
@@ -287,7 +290,7 @@ static void permission_denied_says_which_group_to_join(void **state)
     close(l.master);
 }
 
-// --- waiting --------------------------------------------------------------------------------------------
+// --- waiting -------------------------------------------------------------------------------------
 
 // Waits for a byte on fd, then hangs up and requests the token, as far as there is one.
 struct helper {
@@ -393,14 +396,15 @@ static void draining_drops_what_is_there(void **state)
     close(l.master);
 }
 
-// --- TCP ------------------------------------------------------------------------------------------------
+// --- TCP -----------------------------------------------------------------------------------------
 
 static int listen_on(char link[64], int backlog)
 {
     struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t size = sizeof a;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_true(fd >= 0 && bind(fd, (struct sockaddr *)&a, sizeof a) == 0 && listen(fd, backlog) == 0);
+    assert_true(fd >= 0 && bind(fd, (struct sockaddr *)&a, sizeof a) == 0 &&
+                listen(fd, backlog) == 0);
     assert_int_equal(getsockname(fd, (struct sockaddr *)&a, &size), 0);
     snprintf(link, 64, "tcp:127.0.0.1:%d", ntohs(a.sin_port));
     return fd;
@@ -500,7 +504,7 @@ static void a_host_that_does_not_answer_is_given_up(void **state)
     close(server);
 }
 
-// --- libserialport itself -------------------------------------------------------------------------------
+// --- libserialport itself ------------------------------------------------------------------------
 
 static void libserialport_serves_a_port_that_looks_real(void **state)
 {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A serial line in virtual time. The driver opens a real pty; what it then reads, writes and waits for on
-// it goes to a simulated port instead, and waiting moves a virtual clock. It works by defining the calls
-// of libc here: they take precedence in the whole program, libmodbus included. So thousands of timeouts
-// cost no time, and the same seed gives the same bytes at the same times. One line a program.
+// A serial line in virtual time. The driver opens a real pty; what it then reads, writes and waits
+// for on it goes to a simulated port instead, and waiting moves a virtual clock. It works by
+// defining the calls of libc here: they take precedence in the whole program, libmodbus included.
+// So thousands of timeouts cost no time, and the same seed gives the same bytes at the same times.
+// One line a program.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -128,8 +129,9 @@ int vline_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout, co
         ready = false;
     }
     if (ready)
-        fds[0].revents = vline_hung_up() && vline.have == 0 ? (short)(POLLHUP | (fds[0].events & POLLIN))
-                                                            : fds[0].events;
+        fds[0].revents = vline_hung_up() && vline.have == 0
+                             ? (short)(POLLHUP | (fds[0].events & POLLIN))
+                             : fds[0].events;
     return fds[0].revents != 0;
 }
 
@@ -206,7 +208,7 @@ static inline struct clk *vline_begin(struct port *port)
     return clk;
 }
 
-// --- a device that a test writes ----------------------------------------------------------------------
+// --- a device that a test writes -----------------------------------------------------------------
 
 struct scripted {
     struct port port; // first
