@@ -61,7 +61,7 @@ struct detector {
 //  - setup chooses the shortest time constant that is not below the one asked, and leaves reserve,
 //    coupling, phase and reference as the operator set them;
 //  - sample is one SNAP?: in-phase, frequency and monitor of one moment. Every other
-//    time it asks for one number more, so that a late or doubled answer to the one before does not fit;
+//    time it asks for one number more, so that a late or doubled answer does not fit;
 //  - condition also reads the sensitivity back: somebody at the front panel is DETECTOR_UNSETTLED.
 int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *cancel,
                         struct detector **ret_detector, struct gon_error *err);
