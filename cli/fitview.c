@@ -56,7 +56,7 @@ static void derived(struct table *t, const json_t *all, const char *key, const c
 static void plain(struct table *t, const char *name, double value)
 {
     table_cell(t, "%s", name);
-    cell(t, value, NAN);
+    cell(t, value, (double)NAN);
     for (int i = 0; i < 4; i++)
         table_cell(t, "%s", "");
 }

@@ -39,7 +39,8 @@ const char *out_end(FILE *out)
     return out_colour(out) ? "\033[0m" : "";
 }
 
-static void say(const char *begin, enum out_style style, const char *fmt, va_list ap)
+__attribute__((format(printf, 3, 0))) static void say(const char *begin, enum out_style style, const char *fmt,
+                                                      va_list ap)
 {
     char text[2000];
     vsnprintf(text, sizeof text, fmt, ap);

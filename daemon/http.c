@@ -348,7 +348,7 @@ static void ping(void *ctx)
             stream_ping(x->stream);
 }
 
-static void say(void *ctx, const char *format, va_list ap)
+__attribute__((format(printf, 2, 0))) static void say(void *ctx, const char *format, va_list ap)
 {
     struct http *h = ctx;
     char text[300];

@@ -68,9 +68,10 @@ static struct run *run_of(const struct catalog_entry *e)
     struct run *run = calloc(1, sizeof *run);
     if (!run)
         return NULL;
+    const double unknown = (double)NAN;
     *run = (struct run){.id = e->id, .state = state_of(e->state), .done = e->done, .total = e->total,
-                        .theta_i_deg = NAN, .theta_r_deg = NAN, .f_per_sr = NAN, .u_per_sr = NAN,
-                        .left_s = NAN};
+                        .theta_i_deg = unknown, .theta_r_deg = unknown, .f_per_sr = unknown, .u_per_sr = unknown,
+                        .left_s = unknown};
     snprintf(run->path, sizeof run->path, "%s", e->path);
     snprintf(run->name, sizeof run->name, "%s", e->name);
     snprintf(run->sample, sizeof run->sample, "%s", e->sample);

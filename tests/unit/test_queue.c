@@ -72,7 +72,7 @@ static struct queue *make(int runs)
     struct queue_ports ports = {NULL, open_run, start_run, fit_run_, close_run, cancel, rearm, changed};
     struct queue *q = queue_new(&ports);
     for (int id = runs; id >= 1; id--)
-        queue_know(q, &(struct run){.id = id, .state = RUN_STOPPED, .left_s = NAN});
+        queue_know(q, &(struct run){.id = id, .state = RUN_STOPPED, .left_s = (double)NAN});
     *said = 0;
     return q;
 }
