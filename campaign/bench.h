@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: MIT
-// The bench file goniod.cfg: the instrument as data. Plain data, no drivers; man goniod.cfg(5) is printed
-// from its table. Thread: any.
+// The bench file goniod.cfg: the instrument as data. Plain data, no drivers; man goniod.cfg(5) is
+// printed from its table. Thread: any.
 #pragma once
 #include "base/cfg.h"
 #include "base/err.h"
 #include "campaign/polarisation.h"
 
-enum { BENCH_BUSES = 4, BENCH_AXES = 3, BENCH_STATIONS = 16, BENCH_NAME = 32, BENCH_LINK = 256, BENCH_FOLDER = 256 };
+enum {
+    BENCH_BUSES = 4,
+    BENCH_AXES = 3,
+    BENCH_STATIONS = 16,
+    BENCH_NAME = 32,
+    BENCH_LINK = 256,
+    BENCH_FOLDER = 256
+};
 
 enum bench_regime {
     BENCH_UNDERFILLED, // the laser spot lies inside the detector's field of view
@@ -15,13 +22,14 @@ enum bench_regime {
 
 struct bench_bus {
     char name[BENCH_NAME];
-    char link[BENCH_LINK]; // "modbus-rtu:/dev/ttyUSB0?baud=115200&parity=E" or "modbus-tcp:host:port"
+    char link[BENCH_LINK]; // "modbus-rtu:/dev/ttyUSB0?baud=115200&parity=E" or
+                           // "modbus-tcp:host:port"
     int timeout_ms;
 };
 
 struct bench_axis {
-    char name[BENCH_NAME];      // "theta_i", "theta_r", "sample"
-    int driver;                 // index into bench_axis_drivers
+    char name[BENCH_NAME]; // "theta_i", "theta_r", "sample"
+    int driver;            // index into bench_axis_drivers
     char bus[BENCH_NAME];
     int unit;                   // Modbus address
     char unit_name[8];          // "deg", "mm": what the following are in
@@ -29,7 +37,7 @@ struct bench_axis {
     double min, max;            // travel limits
     double speed, acceleration; // units/s, units/s^2
     double backlash, deadband;
-    double zero;                // position at step 0
+    double zero; // position at step 0
 };
 
 struct bench_laser {
@@ -58,7 +66,7 @@ struct bench_station {
 struct bench_config {
     char name[64];
     double wavelength_nm;
-    int regime; // enum bench_regime
+    int regime;                                      // enum bench_regime
     double aperture_radius_mm, u_aperture_radius_mm; // of the detector
     double distance_mm, u_distance_mm;               // sample to aperture
     struct bench_bus buses[BENCH_BUSES];
@@ -72,14 +80,17 @@ struct bench_config {
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides
 };
 
-extern const char *const bench_axis_drivers[], *const bench_laser_drivers[], *const bench_detector_drivers[];
+extern const char *const bench_axis_drivers[], *const bench_laser_drivers[],
+                                                   *const bench_detector_drivers[];
 extern const struct cfg_row bench_config_schema[];
 
 // As campaign_config_load and campaign_config_parse.
-int bench_config_load(const char *path, struct cfg_sink sink, struct bench_config *ret_bench, char **ret_text);
+int bench_config_load(const char *path, struct cfg_sink sink, struct bench_config *ret_bench,
+                      char **ret_text);
 int bench_config_parse(const char *text, const char *name, struct cfg_sink sink,
                        struct bench_config *ret_bench);
 
-const struct bench_axis *bench_find_axis(const struct bench_config *b, const char *name); // NULL: none
+const struct bench_axis *bench_find_axis(const struct bench_config *b,
+                                         const char *name); // NULL: none
 const struct bench_station *bench_find_station(const struct bench_config *b, const char *name);
 double bench_omega_sr(const struct bench_config *b); // pi r^2 / d^2

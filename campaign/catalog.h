@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Campaign files in a directory: NNNN-name.gonio. The number is the run's id, which `gonio list` shows and
-// every verb takes for FILE. Thread: any; numbers are given out under a lock on the directory.
+// Campaign files in a directory: NNNN-name.gonio. The number is the run's id, which `gonio list`
+// shows and every verb takes for FILE. Thread: any; numbers are given out under a lock on the
+// directory.
 #pragma once
 #include "base/err.h"
 #include "campaign/store.h"
@@ -11,27 +12,27 @@ struct catalog_entry {
     int id; // 0: a file outside the catalogue
     char path[CATALOG_PATH];
     char name[CAMPAIGN_NAME], sample[CAMPAIGN_NAME];
-    char state[16];   // "queued" before it ever ran, "running", "paused", "stopped", "done", "failed", or
-                      // "interrupted": it says running or paused, but no process holds the file;
-                      // "unreadable": problem says why
+    char state[16]; // "queued" before it ever ran, "running", "paused", "stopped", "done",
+                    // "failed", or "interrupted": it says running or paused, but no process holds
+                    // the file; "unreadable": problem says why
     char problem[240]; // why it is paused, stopped, failed or unreadable
-    int done, total;  // points
+    int done, total;   // points
     int64_t created_utc_ms, started_utc_ms, finished_utc_ms; // 0: not yet
-    int writer_pid;   // 0: nobody writes it
+    int writer_pid;                                          // 0: nobody writes it
 };
 
-// Where campaigns are: wanted when it is not NULL or "", else $GONIO_DIR, else for root /var/lib/gonio, for
-// others $XDG_DATA_HOME/gonio or ~/.local/share/gonio.
+// Where campaigns are: wanted when it is not NULL or "", else $GONIO_DIR, else for root
+// /var/lib/gonio, for others $XDG_DATA_HOME/gonio or ~/.local/share/gonio.
 int catalog_directory(const char *wanted, char *ret_directory, size_t size, struct gon_error *err);
 // Makes the directory (and its parents) when it is missing.
 int catalog_make_directory(const char *directory, struct gon_error *err);
 
 // A new campaign file with the next number, open for writing.
-int catalog_create(const char *directory, const struct store_new *what, struct store **ret_store, int *ret_id,
-                   struct gon_error *err);
+int catalog_create(const char *directory, const struct store_new *what, struct store **ret_store,
+                   int *ret_id, struct gon_error *err);
 
-// What is there, by rising number; returns how many, free *ret_entries. A missing directory is empty. A file
-// that cannot be read is listed with its problem.
+// What is there, by rising number; returns how many, free *ret_entries. A missing directory is
+// empty. A file that cannot be read is listed with its problem.
 int catalog_list(const char *directory, struct catalog_entry **ret_entries, struct gon_error *err);
 int catalog_read(const char *path, struct catalog_entry *ret_entry); // never fails: see problem
 int catalog_id(const char *path); // of its name; 0 when it has none

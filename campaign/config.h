@@ -9,19 +9,26 @@
 
 #include <stdint.h>
 
-enum { CAMPAIGN_ANGLES = 100, CAMPAIGN_NAME = 64, CAMPAIGN_NOTES = 1024, POL_IN_LASER = POL_UNKNOWN };
+enum {
+    CAMPAIGN_ANGLES = 100,
+    CAMPAIGN_NAME = 64,
+    CAMPAIGN_NOTES = 1024,
+    POL_IN_LASER = POL_UNKNOWN
+};
 
 struct campaign_config {
     char name[CAMPAIGN_NAME], sample[CAMPAIGN_NAME], operator_name[CAMPAIGN_NAME];
     char notes[CAMPAIGN_NOTES];
     double theta_i_deg[CAMPAIGN_ANGLES]; // in the order of measurement, all different, 0..85
     int theta_i_count;
-    double from_deg, to_deg, step_deg;   // theta_r, signed
-    double dense_half_width_deg, dense_step_deg, dense_weight; // |theta_r - theta_i| <= half width, edges included
+    double from_deg, to_deg, step_deg; // theta_r, signed
+    double dense_half_width_deg, dense_step_deg,
+        dense_weight;      // |theta_r - theta_i| <= half width, edges included
     double phi_deg;        // how the sample was mounted: recorded, nothing moves
     int pol_in;            // enum polarisation, or POL_IN_LASER: what the bench says of its laser
     int pol_out;           // analyser before the detector; POL_U: none
-    double blind_half_deg; // |theta_r + theta_i| < this is skipped: the detector shadows the beam; 0: nothing
+    double blind_half_deg; // |theta_r + theta_i| < this is skipped: the detector shadows the beam;
+                           // 0: nothing
     int readings, dark_readings, beam_readings; // samples averaged a point
     struct {
         int method, weighting, diffuse; // enum fit_method, fit_weighting, brdf_diffuse
@@ -32,14 +39,14 @@ struct campaign_config {
 
 extern const struct cfg_row campaign_config_schema[];
 
-// Reads and checks a file; every mistake goes to the sink as "file:line: ...". ret_text (may be NULL)
-// gets the file as it was read; free it. GON_E_INPUT when anything is wrong.
+// Reads and checks a file; every mistake goes to the sink as "file:line: ...". ret_text (may be
+// NULL) gets the file as it was read; free it. GON_E_INPUT when anything is wrong.
 int campaign_config_load(const char *path, struct cfg_sink sink, struct campaign_config *ret_config,
                          char **ret_text);
 // The same from a text; name stands in messages where the path would.
 int campaign_config_parse(const char *text, const char *name, struct cfg_sink sink,
                           struct campaign_config *ret_config);
 
-// What the campaign asks of the fit: method, weights, diffuse part, seed, dense weight and zone (wider by
-// 0.01 deg, so that an encoder's last digit does not push a point of the edge out of it).
+// What the campaign asks of the fit: method, weights, diffuse part, seed, dense weight and zone
+// (wider by 0.01 deg, so that an encoder's last digit does not push a point of the edge out of it).
 struct fit_options campaign_fit_options(const struct campaign_config *c);

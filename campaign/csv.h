@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A CSV file of numbers: '#' lines are comments, the first other line names the columns, blank lines are
-// skipped; CRLF, a byte-order mark and fields in double quotes are fine. Numbers have a decimal point,
-// whatever the locale. Errors are GON_E_INPUT and begin with "file:line: ". Thread: its maker's.
+// A CSV file of numbers: '#' lines are comments, the first other line names the columns, blank
+// lines are skipped; CRLF, a byte-order mark and fields in double quotes are fine. Numbers have a
+// decimal point, whatever the locale. Errors are GON_E_INPUT and begin with "file:line: ". Thread:
+// its maker's.
 #pragma once
 #include "base/err.h"
 
@@ -16,11 +17,13 @@ struct csv_field {
 };
 
 int csv_open(const char *path, struct csv **ret_csv, struct gon_error *err);
-int csv_parse(const char *text, size_t size, const char *name, struct csv **ret_csv, struct gon_error *err);
+int csv_parse(const char *text, size_t size, const char *name, struct csv **ret_csv,
+              struct gon_error *err);
 void csv_close(struct csv *c); // NULL is fine
 
 int csv_column(const struct csv *c, const char *name); // its index, -1: none; -2: there twice
-// Adds to err: "no column 'NAME'" with the one that may have been meant, or all there are. GON_E_INPUT.
+// Adds to err: "no column 'NAME'" with the one that may have been meant, or all there are.
+// GON_E_INPUT.
 int csv_no_column(const struct csv *c, const char *name, struct gon_error *err);
 
 int csv_next(struct csv *c, struct gon_error *err); // 1: a row; 0: the end; GON_E_INPUT: ragged

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Data for the fit, from a CSV or from a campaign file. Degrees become radians here. Thread: any.
 //
-// CSV: '#' lines are comments; the first other line names the columns. Needed: theta_i_deg; theta_r_signed_deg
-// (>= 0: forward, dphi = 180 deg) or theta_r_deg and dphi_deg; a value column, f_r unless another is named.
-// Used when there: u_f_r (type A, standard uncertainty), pol_in, pol_out. Other columns are ignored. CRLF, a
-// byte-order mark and rows that occur twice are fine. Errors are "file:line: ...", GON_E_INPUT: an empty
-// field, what is not a finite number with a decimal point, a ragged row, theta outside [0, 90), a value
-// column that is all zero, u_f_r <= 0, an analyser (pol_out other than u).
+// CSV: '#' lines are comments; the first other line names the columns. Needed: theta_i_deg;
+// theta_r_signed_deg (>= 0: forward, dphi = 180 deg) or theta_r_deg and dphi_deg; a value column,
+// f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in, pol_out. Other columns
+// are ignored. CRLF, a byte-order mark and rows that occur twice are fine. Errors are "file:line:
+// ...", GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged
+// row, theta outside [0, 90), a value column that is all zero, u_f_r <= 0, pol_in or pol_out
+// other than u.
 #pragma once
 #include "base/err.h"
 #include "campaign/store.h"
@@ -20,15 +21,15 @@ enum { DATASET_ANGLES = 100 };
 struct dataset_filter {
     double theta_i_max_deg; // INFINITY: all
     double theta_i_deg[DATASET_ANGLES];
-    int theta_i_count;      // 0: all
+    int theta_i_count; // 0: all
 };
 
 struct dataset {
     size_t count;
     double *theta_i_rad, *theta_r_rad, *dphi_rad, *f_per_sr;
-    double *u_per_sr;     // NULL unless every row has one
-    double u_scale;       // relative standard uncertainty common to all; 0 from a CSV
-    size_t left_out;      // by the filter
+    double *u_per_sr; // NULL unless every row has one
+    double u_scale;   // relative standard uncertainty common to all; 0 from a CSV
+    size_t left_out;  // by the filter
     char source[512];
 };
 
@@ -37,10 +38,11 @@ struct dataset_filter dataset_filter_all(void);
 // column: NULL for "f_r".
 int dataset_from_csv(const char *path, const char *column, const struct dataset_filter *filter,
                      struct dataset *ret_data, struct gon_error *err);
-// Reduces the readings. ret_reduction may be NULL; otherwise it holds what was reduced (reduction_clear).
-// Nominal angles of the plan are filtered, the encoders' are fitted.
-int dataset_from_store(struct store *s, const struct dataset_filter *filter, struct dataset *ret_data,
-                       struct reduction *ret_reduction, struct gon_error *err);
+// Reduces the readings. ret_reduction may be NULL; otherwise it holds what was reduced
+// (reduction_clear). Nominal angles of the plan are filtered, the encoders' are fitted.
+int dataset_from_store(struct store *s, const struct dataset_filter *filter,
+                       struct dataset *ret_data, struct reduction *ret_reduction,
+                       struct gon_error *err);
 void dataset_clear(struct dataset *d); // frees what it holds, not d; NULL is fine
 
 struct fit_data dataset_fit_data(const struct dataset *d); // borrowed from d

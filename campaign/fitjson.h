@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A fit as the JSON that `gonio fit --json`, the daemon and the campaign file share, and as a row of the
-// file's fit table. Thread: any.
+// A fit as the JSON that `gonio fit --json`, the daemon and the campaign file share, and as a row
+// of the file's fit table. Thread: any.
 #pragma once
 #include "fit/fit.h"
 
@@ -9,21 +9,23 @@
 #include <stdint.h>
 
 struct fit_record {
-    int sweep;            // after which; -1: not of a campaign
-    int64_t reduction;    // id in the file; 0: none
+    int sweep;         // after which; -1: not of a campaign
+    int64_t reduction; // id in the file; 0: none
     size_t points;
     struct fit_options options;
     struct fit_result result;
-    const char *trace;    // text, may be NULL
-    const char *note;     // one more warning (reduction_warning), may be NULL or ""
+    const char *trace; // text, may be NULL
+    const char *note;  // one more warning (reduction_warning), may be NULL or ""
 };
 
 // {"method","weights","points","seed","delta","params":{...},"derived":{...},"correlation":[...],
-// "chi2_per_dof","evaluations","elapsed_ms","elapsed_total_ms","warnings":[...]} with 17 significant digits;
-// what is not finite is null. indent: 0 one line, else that many blanks. Free it; NULL without memory.
+// "chi2_per_dof","evaluations","elapsed_ms","elapsed_total_ms","warnings":[...]} with 17
+// significant digits; what is not finite is null. indent: 0 one line, else that many blanks. Free
+// it; NULL without memory.
 char *fit_json(const struct fit_record *f, int indent);
 
 const char *fit_method_name(enum fit_method m);       // "memetic", "paper"
 const char *fit_weighting_name(enum fit_weighting w); // "uniform", "dense", "relative", "variance"
 const char *fit_diffuse_name(enum brdf_diffuse d);    // "paper", "lambert"
-extern const char *const fit_method_names[], *const fit_weighting_names[], *const fit_diffuse_names[]; // NULL-ended
+extern const char *const fit_method_names[], *const fit_weighting_names[],
+                                                 *const fit_diffuse_names[]; // NULL-ended

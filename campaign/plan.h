@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The plan: every point of a campaign in the order of measurement. Computed from the configuration alone,
-// and from the bench where there is one; moves nothing. Thread: any.
+// The plan: every point of a campaign in the order of measurement. Computed from the configuration
+// alone, and from the bench where there is one; moves nothing. Thread: any.
 //
 //   sweep 0            dark (laser off), then the beam
-//   sweep 1..sweeps    one theta_i each, in the file's order; theta_r from low to high, so that the axis
-//                      always comes from the same side; coarse grid and dense zone merged, a direction
-//                      that both ask for is measured once
+//   sweep 1..sweeps    one theta_i each, in the file's order; theta_r from low to high, so that the
+//                      axis always comes from the same side; coarse grid and dense zone merged, a
+//                      direction that both ask for is measured once
 //   sweep sweeps + 1   the beam again, then dark (laser off)
 #pragma once
 #include "base/err.h"
@@ -49,14 +49,15 @@ struct plan {
 };
 
 // bench may be NULL. GON_E_INPUT: more than PLAN_MOST_POINTS, or nothing is left to measure.
-int plan_make(const struct campaign_config *config, const struct bench_config *bench, struct plan *ret_plan,
-              struct gon_error *err);
+int plan_make(const struct campaign_config *config, const struct bench_config *bench,
+              struct plan *ret_plan, struct gon_error *err);
 void plan_clear(struct plan *p); // frees what it holds, not p; NULL is fine
 
-const char *plan_kind_name(enum plan_kind k);          // "sample", "beam", "dark"
-const char *plan_skip_text(enum plan_skip_reason r);   // "in the detector's shadow", "beyond an axis's limits"
+const char *plan_kind_name(enum plan_kind k); // "sample", "beam", "dark"
+// "in the detector's shadow", "beyond an axis's limits"
+const char *plan_skip_text(enum plan_skip_reason r);
 
-// What a reading costs the detector (daemon/acquire.h says why): until the step response of n equal poles
-// is within 1e-4, and between samples that are nearly independent.
+// What a reading costs the detector (daemon/acquire.h says why): until the step response of n equal
+// poles is within 1e-4, and between samples that are nearly independent.
 double plan_settle_s(double time_constant_s, int slope_db);
 double plan_spacing_s(double time_constant_s, int slope_db);

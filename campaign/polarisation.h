@@ -5,7 +5,8 @@
 
 enum polarisation { POL_U, POL_S, POL_P, POL_PLUS45, POL_MINUS45, POL_R, POL_L, POL_UNKNOWN };
 
-extern const char *const polarisation_names[]; // "u", "s", "p", "+45", "-45", "R", "L", "unknown", NULL
+extern const char
+    *const polarisation_names[]; // "u", "s", "p", "+45", "-45", "R", "L", "unknown", NULL
 
 const char *polarisation_name(enum polarisation p);
 int polarisation_find(const char *name); // enum polarisation, or -1

@@ -2,19 +2,21 @@
 // From volts to absolute BRDF with its uncertainty (metrology: GUM, type A and B kept apart).
 //
 //   underfilled  f = [(S - Ds)/(M - Dm)] / [(S0 - Ds0)/(M0 - Dm0)] / (Omega cos theta_r)
-//   overfilled   the same over (Omega cos theta_i), the beam reading being that of the field of view
+//   overfilled   the same over (Omega cos theta_i), the beam reading being that of the
+//                field of view
 //
-// S signal, M monitor (1 without one), D dark with the laser off, 0 the beam; Omega = pi r^2/d^2. Opening
-// and closing beam and dark are averaged; half their difference is part of their uncertainty. Angles are
-// those of the encoders.
+// S signal, M monitor (1 without one), D dark with the laser off, 0 the beam; Omega = pi r^2/d^2.
+// Opening and closing beam and dark are averaged; half their difference is part of their
+// uncertainty. Angles are those of the encoders.
 //
-// u_A, uncorrelated from point to point: noise of signal and monitor, and of the dark. With four samples a
-// point the scatter of one point says little (its sd is uncertain by 40 %), and weights from it would
-// favour points that happened to scatter little. So one model for all,
+// u_A, uncorrelated from point to point: noise of signal and monitor, and of the dark. With four
+// samples a point the scatter of one point says little (its sd is uncertain by 40 %), and weights
+// from it would favour points that happened to scatter little. So one model for all,
 //   variance of a sample = floor^2 + (rel S)^2,
 // is fitted to all accepted readings' sample variances by maximum likelihood (they follow a gamma
 // distribution with (count - 1)/2 degrees of shape). Likewise rel_monitor.
-// Fluctuations of the laser that the monitor divides out count in both: u_A is rather too large than too small.
+// Fluctuations of the laser that the monitor divides out count in both: u_A is rather too large
+// than too small.
 // u_B, common to all points as one factor: beam, 2u(r)/r, 2u(d)/d, linearity.
 // Thread: any.
 #pragma once
@@ -29,7 +31,7 @@ struct reduced_point {
     double f_per_sr;
     double u_a_per_sr; // NAN when no reading had two samples or none scattered
     double u_b_per_sr;
-    double weight;     // of the plan
+    double weight; // of the plan
 };
 
 struct reduce_noise {
@@ -45,7 +47,8 @@ struct reduce_reference { // means of the accepted readings; NAN where there is 
 struct reduction {
     struct reduced_point *points; // in the plan's order
     int count;
-    int left_out;  // points on the sample that were measured and could not be reduced (cosine, monitor)
+    int left_out;     // points on the sample that were measured and could not be reduced (cosine,
+                      // monitor)
     int beams, darks; // how many readings the references are means of
     double omega_sr;
     struct reduce_reference reference;
@@ -57,20 +60,23 @@ struct reduction {
     int polarisation;   // of the light on the sample, enum polarisation
 };
 
-// What the numbers are not, in one sentence: with a polarised laser f_00 + m f_01. Returns the length that
-// snprintf would; 0: nothing to say.
+// What the numbers are not, in one sentence: with a polarised laser f_00 + m f_01. Returns the
+// length that snprintf would; 0: nothing to say.
 int reduction_warning(const struct reduction *r, char *text, size_t size);
 
-// Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark or no beam reading yet, or a beam that is
-// not above the dark.
-int reduce_run(const struct bench_config *bench, const struct plan *plan, const struct store_reading *rows,
-               int count, struct reduction *ret_reduction, struct gon_error *err);
+// Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark or no beam reading yet, or a
+// beam that is not above the dark.
+int reduce_run(const struct bench_config *bench, const struct plan *plan,
+               const struct store_reading *rows, int count, struct reduction *ret_reduction,
+               struct gon_error *err);
 // The same from a campaign file, with the bench and the polarisation that are kept in it.
 int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err);
 void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL is fine
 
 // Means of the opening references (sweep 0), for provisional values after a resume.
-struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows, int count);
+struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
+                                       int count);
 
 // The noise model alone.
-struct reduce_noise reduce_noise_of(const struct plan *plan, const struct store_reading *rows, int count);
+struct reduce_noise reduce_noise_of(const struct plan *plan, const struct store_reading *rows,
+                                    int count);

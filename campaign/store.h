@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: MIT
-// A campaign is one SQLite file: plan, configuration and bench as they were, every reading with every
-// attempt, reductions, fits, events. Readings are added, never changed. Acknowledged means committed.
+// A campaign is one SQLite file: plan, configuration and bench as they were, every reading with
+// every attempt, reductions, fits, events. Readings are added, never changed. Acknowledged means
+// committed.
 //
-// While it is written: WAL, synchronous=FULL, a commit a call. Closed: a single file. One writer at a time,
-// held by a lock on "FILE-lock" beside it, which names its process; readers never wait for it. A struct
-// store belongs to one thread; several may be open on one file.
+// While it is written: WAL, synchronous=FULL, a commit a call. Closed: a single file. One writer at
+// a time, held by a lock on "FILE-lock" beside it, which names its process; readers never wait for
+// it. A struct store belongs to one thread; several may be open on one file.
 //
-// Errors: GON_E_STORE, the file or its disk (full, I/O, busy, moved, damaged: the text says which and what
-// to do); after one the same call may be repeated. GON_E_REFUSED: in use by another process, on a network
-// file system, or newer than this program. GON_E_INPUT: no campaign file, or a value that cannot be stored.
+// Errors: GON_E_STORE, the file or its disk (full, I/O, busy, moved, damaged: the text says which
+// and what to do); after one the same call may be repeated. GON_E_REFUSED: in use by another
+// process, on a network file system, or newer than this program. GON_E_INPUT: no campaign file, or
+// a value that cannot be stored.
 //
 // Each reading carries the CRC-32C (base/crc32c.h) of these little-endian bytes in this order:
-//   int32 sweep, point, attempt; int64 t_utc_ms; int32 theta_i_udeg, theta_r_udeg; float64 signal_v,
-//   signal_sd_v, monitor_v, monitor_sd_v (NULL is the quiet NaN 0x7ff8000000000000); int32 count, range;
-//   uint32 flags.
+//   int32 sweep, point, attempt; int64 t_utc_ms; int32 theta_i_udeg, theta_r_udeg; float64
+//   signal_v, signal_sd_v, monitor_v, monitor_sd_v (NULL is the quiet NaN 0x7ff8000000000000);
+//   int32 count, range; uint32 flags.
 // A row that fails it is an error that names sweep and point, whenever it is read.
 #pragma once
 #include "base/err.h"
@@ -34,13 +36,13 @@ enum store_mode { STORE_READ, STORE_WRITE };
 
 enum store_flag {
     STORE_SATURATED = 1 << 0,
-    STORE_UNDER_RANGE = 1 << 1,  // too small for its range: made again further down
-    STORE_STALE = 1 << 2,        // the same bits again and again
-    STORE_MONITOR_LOW = 1 << 3,  // the light was lost
-    STORE_MOVED = 1 << 4,        // an axis moved while it was read
-    STORE_UNLOCKED = 1 << 5,     // no reference
-    STORE_UNSETTLED = 1 << 6,    // something changed the filter
-    STORE_DISCARDED = 1 << 7     // by the engine, as an event says
+    STORE_UNDER_RANGE = 1 << 1, // too small for its range: made again further down
+    STORE_STALE = 1 << 2,       // the same bits again and again
+    STORE_MONITOR_LOW = 1 << 3, // the light was lost
+    STORE_MOVED = 1 << 4,       // an axis moved while it was read
+    STORE_UNLOCKED = 1 << 5,    // no reference
+    STORE_UNSETTLED = 1 << 6,   // something changed the filter
+    STORE_DISCARDED = 1 << 7    // by the engine, as an event says
 };
 // A reading with any of these does not count as the point's.
 #define STORE_REJECTING 0xffu
@@ -49,24 +51,24 @@ struct store_reading {
     int sweep, point, attempt; // attempt from 1
     int64_t t_utc_ms;
     int32_t theta_i_udeg, theta_r_udeg; // from the encoders
-    double signal_v, signal_sd_v;   // mean and sample sd; must be finite
-    double monitor_v, monitor_sd_v; // NAN: no monitor
-    int count;                      // samples averaged, >= 1
-    int range;                      // of the detector
-    unsigned flags;                 // of store_flag
+    double signal_v, signal_sd_v;       // mean and sample sd; must be finite
+    double monitor_v, monitor_sd_v;     // NAN: no monitor
+    int count;                          // samples averaged, >= 1
+    int range;                          // of the detector
+    unsigned flags;                     // of store_flag
 };
 
 struct store_progress {
-    int done, total;      // points
-    int sweep, point;     // the first without an accepted reading; -1 when there is none
-    int64_t readings;     // rows: every attempt
-    int sweeps_done;      // 1..sweeps that are complete
+    int done, total;  // points
+    int sweep, point; // the first without an accepted reading; -1 when there is none
+    int64_t readings; // rows: every attempt
+    int sweeps_done;  // 1..sweeps that are complete
     int sweeps;
 };
 
 struct store_event {
     int64_t id, t_utc_ms;
-    char level[8];    // "err", "warn", "notice", "info"
+    char level[8]; // "err", "warn", "notice", "info"
     char source[32];
     const char *text; // borrowed for the call
 };
@@ -80,56 +82,70 @@ struct store_new {
     int64_t t_utc_ms;
 };
 
-// A new file, open for writing; GON_E_REFUSED when there is one already. Nothing is left when it fails.
+// A new file, open for writing; GON_E_REFUSED when there is one already. Nothing is left when it
+// fails.
 int store_create(const char *path, const struct store_new *what, struct store **ret_store,
                  struct gon_error *err);
 // For writing, the file is checked as a whole first, and the last 1000 readings' CRCs.
-int store_open(const char *path, enum store_mode mode, struct store **ret_store, struct gon_error *err);
-// Makes it a single file. The store is gone in any case; GON_E_STORE when the last checkpoint failed, which
-// loses nothing. NULL is fine.
+int store_open(const char *path, enum store_mode mode, struct store **ret_store,
+               struct gon_error *err);
+// Makes it a single file. The store is gone in any case; GON_E_STORE when the last checkpoint
+// failed, which loses nothing. NULL is fine.
 int store_close(struct store *s, struct gon_error *err);
 
-// How long somebody else's write lock on the file is waited for: 8000 ms unless said otherwise here.
+// How long somebody else's write lock on the file is waited for: 8000 ms unless said otherwise
+// here.
 void store_set_patience(struct store *s, int patience_ms);
 
 // The process that has the file open for writing, 0: none.
 int store_writer(const char *path);
 
-// --- writing -----------------------------------------------------------------------------------------
-// The same row again is accepted again; another row with the same (sweep, point, attempt) is GON_E_INPUT,
-// as is a value that is not finite and a point that is not in the plan.
+// --- writing
+// ----------------------------------------------------------------------------------------- The
+// same row again is accepted again; another row with the same (sweep, point, attempt) is
+// GON_E_INPUT, as is a value that is not finite and a point that is not in the plan.
 int store_append_reading(struct store *s, const struct store_reading *r, struct gon_error *err);
 int store_append_event(struct store *s, int64_t t_utc_ms, const char *level, const char *source,
                        const char *text, struct gon_error *err);
 // A run's state ("running", "paused", "stopped", "done", "failed") and why; a history.
 int store_append_state(struct store *s, int64_t t_utc_ms, const char *state, const char *why,
                        struct gon_error *err);
-int store_append_reduction(struct store *s, int64_t t_utc_ms, const struct reduction *r, int64_t *ret_id,
-                           struct gon_error *err);
+int store_append_reduction(struct store *s, int64_t t_utc_ms, const struct reduction *r,
+                           int64_t *ret_id, struct gon_error *err);
 int store_append_fit(struct store *s, int64_t t_utc_ms, const struct fit_record *f, int64_t *ret_id,
                      struct gon_error *err);
 
-// --- reading -----------------------------------------------------------------------------------------
+// --- reading
+// -----------------------------------------------------------------------------------------
 const char *store_path(const struct store *s);
-int store_read_plan(struct store *s, struct plan *ret_plan, struct gon_error *err); // done and attempts filled in
-// All readings of a sweep (-1: of all sweeps) in the order of the plan; returns how many, free *ret_rows.
-int store_read_readings(struct store *s, int sweep, struct store_reading **ret_rows, struct gon_error *err);
-int store_read_progress(struct store *s, struct store_progress *ret_progress, struct gon_error *err);
+int store_read_plan(struct store *s, struct plan *ret_plan,
+                    struct gon_error *err); // done and attempts filled in
+// All readings of a sweep (-1: of all sweeps) in the order of the plan; returns how many, free
+// *ret_rows.
+int store_read_readings(struct store *s, int sweep, struct store_reading **ret_rows,
+                        struct gon_error *err);
+int store_read_progress(struct store *s, struct store_progress *ret_progress,
+                        struct gon_error *err);
 int store_read_config(struct store *s, struct campaign_config *ret_config, struct gon_error *err);
 int store_read_bench(struct store *s, struct bench_config *ret_bench, struct gon_error *err);
-// A text of meta ("name", "sample", "created_utc_ms", "config", "bench", "gonio_version", ...); free it.
-// NULL: no such key, or it cannot be read.
+// A text of meta ("name", "sample", "created_utc_ms", "config", "bench", "gonio_version", ...);
+// free it. NULL: no such key, or it cannot be read.
 char *store_read_meta(struct store *s, const char *key);
-// The newest state, "" when there is none yet; both buffers may be NULL. ret_since_ms: when it began.
-int store_read_state(struct store *s, char *ret_state, size_t state_size, char *ret_why, size_t why_size,
-                     int64_t *ret_since_ms, struct gon_error *err);
+// The newest state, "" when there is none yet; both buffers may be NULL. ret_since_ms: when it
+// began.
+int store_read_state(struct store *s, char *ret_state, size_t state_size, char *ret_why,
+                     size_t why_size, int64_t *ret_since_ms, struct gon_error *err);
 // When it first was in a state; 0: never.
 int64_t store_read_state_time(struct store *s, const char *state);
-// Events after an id (0: all), oldest first; each returns false to end. Returns how many were shown.
-int store_each_event(struct store *s, int64_t after_id, bool (*each)(void *ctx, const struct store_event *e),
-                     void *ctx, struct gon_error *err);
-// The JSON of a fit: of the newest after a sweep, or with sweep -1 the newest of all; free it. NULL: none.
+// Events after an id (0: all), oldest first; each returns false to end. Returns how many were
+// shown.
+int store_each_event(struct store *s, int64_t after_id,
+                     bool (*each)(void *ctx, const struct store_event *e), void *ctx,
+                     struct gon_error *err);
+// The JSON of a fit: of the newest after a sweep, or with sweep -1 the newest of all; free it.
+// NULL: none.
 char *store_read_fit(struct store *s, int sweep);
 // Its ids, oldest first: returns how many, at most most.
-int store_read_fits(struct store *s, int64_t *ret_ids, int *ret_sweeps, int most, struct gon_error *err);
+int store_read_fits(struct store *s, int64_t *ret_ids, int *ret_sweeps, int most,
+                    struct gon_error *err);
 int store_flags_text(unsigned flags, char *text, size_t size); // "saturated, moved"; as snprintf

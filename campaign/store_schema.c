@@ -10,113 +10,74 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define PARAMETER(p)                                                                               \
-    p " REAL, u_" p " REAL, " p "_lo95 REAL, " p "_hi95 REAL, " p "_identified INTEGER, " p        \
-      "_at_bound INTEGER, "
+// clang-format off
+#define PARAMETER(p) p " REAL, u_" p " REAL, " p "_lo95 REAL, " p "_hi95 REAL, " \
+                     p "_identified INTEGER, " p "_at_bound INTEGER, "
 #define DERIVED(p) p " REAL, u_" p " REAL, "
-#define NEVER(what, table, text)                                                                   \
-    "CREATE TRIGGER " table "_" what " BEFORE " what " ON " table                                  \
+#define NEVER(what, table, text) \
+    "CREATE TRIGGER " table "_" what " BEFORE " what " ON " table \
     " BEGIN SELECT RAISE(ABORT, '" text "'); END;"
 
 const char store_schema_sql[] =
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value) WITHOUT ROWID;"
+
     "CREATE TABLE plan (sweep INTEGER, point INTEGER, kind TEXT NOT NULL, station TEXT NOT NULL,"
     " theta_i_udeg INTEGER NOT NULL, theta_r_udeg INTEGER NOT NULL, phi_udeg INTEGER NOT NULL,"
     " pol_in TEXT NOT NULL, pol_out TEXT NOT NULL, weight REAL NOT NULL, dense INTEGER NOT NULL,"
     " PRIMARY KEY (sweep, point)) WITHOUT ROWID;"
-    "CREATE TABLE reading (sweep INTEGER, point INTEGER, attempt INTEGER, t_utc_ms INTEGER NOT "
-    "NULL,"
-    " theta_i_udeg INTEGER NOT NULL, theta_r_udeg INTEGER NOT NULL, signal_v REAL NOT NULL,"
-    " signal_sd_v REAL NOT NULL, monitor_v REAL, monitor_sd_v REAL, samples INTEGER NOT NULL,"
-    " detector_range INTEGER NOT NULL, flags INTEGER NOT NULL, crc32c INTEGER NOT NULL,"
-    " PRIMARY KEY (sweep, point, attempt)) WITHOUT ROWID;" NEVER("UPDATE", "reading",
-                                                                 "readings are never changed")
-        NEVER(
-            "DELETE", "reading",
-            "readings are never removed") "CREATE TABLE event (id INTEGER PRIMARY KEY, t_utc_ms "
-                                          "INTEGER NOT NULL, level TEXT NOT NULL,"
-                                          " source TEXT NOT NULL, text TEXT NOT NULL);"
-                                          "CREATE TABLE state (id INTEGER PRIMARY KEY, t_utc_ms "
-                                          "INTEGER NOT NULL, state TEXT NOT NULL, why TEXT NOT "
-                                          "NULL);"
-                                          "CREATE TABLE reduction (id INTEGER PRIMARY KEY, "
-                                          "t_utc_ms INTEGER NOT NULL, gonio_version TEXT NOT NULL,"
-                                          " regime TEXT NOT NULL, points INTEGER NOT NULL, "
-                                          "left_out INTEGER NOT NULL, omega_sr REAL,"
-                                          " beam_signal_v REAL, beam_monitor_v REAL, dark_signal_v "
-                                          "REAL, dark_monitor_v REAL, u_dark_v REAL,"
-                                          " noise_floor_v REAL, noise_rel REAL, noise_monitor_rel "
-                                          "REAL, u_beam_rel REAL, u_radius_rel REAL,"
-                                          " u_distance_rel REAL, u_linearity_rel REAL, u_scale_rel "
-                                          "REAL);"
-                                          "CREATE TABLE reduced (reduction INTEGER, sweep INTEGER, "
-                                          "point INTEGER, attempt INTEGER NOT NULL,"
-                                          " f_r_per_sr REAL NOT NULL, u_a_per_sr REAL, u_b_per_sr "
-                                          "REAL NOT NULL,"
-                                          " PRIMARY KEY (reduction, sweep, point)) WITHOUT ROWID;"
-                                          "CREATE TABLE fit (id INTEGER PRIMARY KEY, t_utc_ms "
-                                          "INTEGER NOT NULL, gonio_version TEXT NOT NULL,"
-                                          " sweep INTEGER NOT NULL, reduction INTEGER, method TEXT "
-                                          "NOT NULL, weights TEXT NOT NULL,"
-                                          " diffuse TEXT NOT NULL, seed INTEGER NOT NULL, points "
-                                          "INTEGER NOT NULL, delta REAL, " PARAMETER("n") PARAMETER(
-                                              "k") PARAMETER("sigma") PARAMETER("ks")
-                                              PARAMETER("kd") DERIVED("ks_r0") DERIVED("ks_r45")
-                                                  DERIVED("dhr_0") DERIVED("dhr_45") DERIVED(
-                                                      "dhr_60") "chi2_per_dof REAL, warnings "
-                                                                "INTEGER NOT NULL, evaluations "
-                                                                "INTEGER, elapsed_ms REAL, "
-                                                                "elapsed_total_ms REAL,"
-                                                                " json TEXT NOT NULL, trace TEXT);"
-                                                                // Every reading on the sample; f_r
-                                                                // of the newest reduction for those
-                                                                // that it used.
-                                                                "CREATE VIEW reading_brdf AS "
-                                                                "SELECT r.sweep, r.point, "
-                                                                "r.attempt, r.t_utc_ms,"
-                                                                " p.theta_i_udeg / 1e6 AS "
-                                                                "theta_i_nominal_deg, "
-                                                                "p.theta_r_udeg / 1e6 AS "
-                                                                "theta_r_signed_nominal_deg,"
-                                                                " r.theta_i_udeg / 1e6 AS "
-                                                                "theta_i_deg, r.theta_r_udeg / 1e6 "
-                                                                "AS theta_r_signed_deg,"
-                                                                " p.phi_udeg / 1e6 AS phi_deg, "
-                                                                "p.pol_in, p.pol_out, p.weight AS "
-                                                                "g,"
-                                                                " d.f_r_per_sr AS f_r, "
-                                                                "d.u_a_per_sr AS u_A, d.u_b_per_sr "
-                                                                "AS u_B, r.flags,"
-                                                                " r.signal_v, r.signal_sd_v, "
-                                                                "r.monitor_v, r.monitor_sd_v, "
-                                                                "r.samples, r.detector_range"
-                                                                " FROM reading r JOIN plan p ON "
-                                                                "p.sweep = r.sweep AND p.point = "
-                                                                "r.point"
-                                                                " LEFT JOIN reduced d ON "
-                                                                "d.reduction = (SELECT max(id) "
-                                                                "FROM reduction) AND d.sweep = "
-                                                                "r.sweep"
-                                                                " AND d.point = r.point AND "
-                                                                "d.attempt = r.attempt WHERE "
-                                                                "p.kind = 'sample';"
-                                                                "CREATE VIEW fit_result AS SELECT "
-                                                                "id, t_utc_ms, sweep, method, "
-                                                                "weights, diffuse, seed, points, "
-                                                                "delta,"
-                                                                " n, u_n, n_lo95, n_hi95, "
-                                                                "n_identified, k, u_k, k_lo95, "
-                                                                "k_hi95, k_identified,"
-                                                                " sigma, u_sigma, sigma_lo95, "
-                                                                "sigma_hi95, sigma_identified, ks, "
-                                                                "u_ks, ks_lo95, ks_hi95, "
-                                                                "ks_identified,"
-                                                                " kd, u_kd, kd_lo95, kd_hi95, "
-                                                                "kd_identified, ks_r0, u_ks_r0, "
-                                                                "ks_r45, u_ks_r45, dhr_0, u_dhr_0,"
-                                                                " dhr_45, u_dhr_45, dhr_60, "
-                                                                "u_dhr_60, chi2_per_dof, warnings, "
-                                                                "elapsed_ms FROM fit;";
+
+    "CREATE TABLE reading (sweep INTEGER, point INTEGER, attempt INTEGER,"
+    " t_utc_ms INTEGER NOT NULL, theta_i_udeg INTEGER NOT NULL, theta_r_udeg INTEGER NOT NULL,"
+    " signal_v REAL NOT NULL, signal_sd_v REAL NOT NULL, monitor_v REAL, monitor_sd_v REAL,"
+    " samples INTEGER NOT NULL, detector_range INTEGER NOT NULL, flags INTEGER NOT NULL,"
+    " crc32c INTEGER NOT NULL, PRIMARY KEY (sweep, point, attempt)) WITHOUT ROWID;"
+    NEVER("UPDATE", "reading", "readings are never changed")
+    NEVER("DELETE", "reading", "readings are never removed")
+
+    "CREATE TABLE event (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL, level TEXT NOT NULL,"
+    " source TEXT NOT NULL, text TEXT NOT NULL);"
+    "CREATE TABLE state (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL, state TEXT NOT NULL,"
+    " why TEXT NOT NULL);"
+
+    "CREATE TABLE reduction (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL,"
+    " gonio_version TEXT NOT NULL, regime TEXT NOT NULL, points INTEGER NOT NULL,"
+    " left_out INTEGER NOT NULL, omega_sr REAL, beam_signal_v REAL, beam_monitor_v REAL,"
+    " dark_signal_v REAL, dark_monitor_v REAL, u_dark_v REAL, noise_floor_v REAL, noise_rel REAL,"
+    " noise_monitor_rel REAL, u_beam_rel REAL, u_radius_rel REAL, u_distance_rel REAL,"
+    " u_linearity_rel REAL, u_scale_rel REAL);"
+    "CREATE TABLE reduced (reduction INTEGER, sweep INTEGER, point INTEGER,"
+    " attempt INTEGER NOT NULL, f_r_per_sr REAL NOT NULL, u_a_per_sr REAL,"
+    " u_b_per_sr REAL NOT NULL, PRIMARY KEY (reduction, sweep, point)) WITHOUT ROWID;"
+
+    "CREATE TABLE fit (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL,"
+    " gonio_version TEXT NOT NULL, sweep INTEGER NOT NULL, reduction INTEGER,"
+    " method TEXT NOT NULL, weights TEXT NOT NULL, diffuse TEXT NOT NULL, seed INTEGER NOT NULL,"
+    " points INTEGER NOT NULL, delta REAL, "
+    PARAMETER("n") PARAMETER("k") PARAMETER("sigma") PARAMETER("ks") PARAMETER("kd")
+    DERIVED("ks_r0") DERIVED("ks_r45") DERIVED("dhr_0") DERIVED("dhr_45") DERIVED("dhr_60")
+    "chi2_per_dof REAL, warnings INTEGER NOT NULL, evaluations INTEGER, elapsed_ms REAL,"
+    " elapsed_total_ms REAL, json TEXT NOT NULL, trace TEXT);"
+
+    // Every reading on the sample; f_r of the newest reduction for those that it used.
+    "CREATE VIEW reading_brdf AS SELECT r.sweep, r.point, r.attempt, r.t_utc_ms,"
+    " p.theta_i_udeg / 1e6 AS theta_i_nominal_deg,"
+    " p.theta_r_udeg / 1e6 AS theta_r_signed_nominal_deg,"
+    " r.theta_i_udeg / 1e6 AS theta_i_deg, r.theta_r_udeg / 1e6 AS theta_r_signed_deg,"
+    " p.phi_udeg / 1e6 AS phi_deg, p.pol_in, p.pol_out, p.weight AS g,"
+    " d.f_r_per_sr AS f_r, d.u_a_per_sr AS u_A, d.u_b_per_sr AS u_B, r.flags,"
+    " r.signal_v, r.signal_sd_v, r.monitor_v, r.monitor_sd_v, r.samples, r.detector_range"
+    " FROM reading r JOIN plan p ON p.sweep = r.sweep AND p.point = r.point"
+    " LEFT JOIN reduced d ON d.reduction = (SELECT max(id) FROM reduction)"
+    " AND d.sweep = r.sweep AND d.point = r.point AND d.attempt = r.attempt"
+    " WHERE p.kind = 'sample';"
+
+    "CREATE VIEW fit_result AS SELECT id, t_utc_ms, sweep, method, weights, diffuse, seed, points,"
+    " delta, n, u_n, n_lo95, n_hi95, n_identified, k, u_k, k_lo95, k_hi95, k_identified,"
+    " sigma, u_sigma, sigma_lo95, sigma_hi95, sigma_identified,"
+    " ks, u_ks, ks_lo95, ks_hi95, ks_identified, kd, u_kd, kd_lo95, kd_hi95, kd_identified,"
+    " ks_r0, u_ks_r0, ks_r45, u_ks_r45, dhr_0, u_dhr_0, dhr_45, u_dhr_45, dhr_60, u_dhr_60,"
+    " chi2_per_dof, warnings, elapsed_ms FROM fit;";
+// clang-format on
 
 // --- the first content
 // -------------------------------------------------------------------------------
