@@ -30,7 +30,7 @@ struct cfg_row {
     size_t offset;               // of the member in its struct
     size_t size;                 // CFG_STRING bytes, CFG_REALS and CFG_GROUPS the most elements
     const char *unit;            // "deg", "s", ... NULL: none
-    double min, max;             // inclusive; CFG_INT, CFG_REAL, CFG_REALS
+    double min, max;             // inclusive; CFG_INT, CFG_REAL, CFG_REALS; equal: any
     const char *fallback;        // default, as written in a file; NULL: must be given. CFG_GROUP: "" = may be left out
     const char *help;            // one sentence
     const char *const *choices;  // CFG_CHOICE, NULL at its end
