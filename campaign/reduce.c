@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOISE_ROUNDS = 200 };
-
 // --- which readings count
 // ----------------------------------------------------------------------------
 
@@ -39,53 +37,52 @@ struct variance { // of one reading's samples
     double nu;    // degrees of freedom
 };
 
-// One step of Fisher scoring for s2 ~ a + b v2 with gamma errors: weighted least squares with the
-// weights nu / (a + b v2)^2, neither part below zero.
-static void score(const struct variance *list, int n, double least, double *a, double *b)
+// With variances a (1 + t v2) the likelihood's best a is known for each t: returns twice its
+// negative logarithm there, without constants.
+static double deviance(const struct variance *list, int n, double t, double *ret_a)
 {
-    double w0 = 0, w1 = 0, w2 = 0, y0 = 0, y1 = 0;
+    double logs = 0, sum = 0, nu = 0;
     for (int i = 0; i < n; i++) {
-        const double mu = fmax(*a + *b * list[i].v2, least), w = list[i].nu / (mu * mu);
-        w0 += w;
-        w1 += w * list[i].v2;
-        w2 += w * list[i].v2 * list[i].v2;
-        y0 += w * list[i].s2;
-        y1 += w * list[i].v2 * list[i].s2;
-    }
-    const double det = w0 * w2 - w1 * w1;
-    double na = y0 / w0, nb = 0;
-    if (det > 1e-12 * w0 * w2) {
-        na = (w2 * y0 - w1 * y1) / det;
-        nb = (w0 * y1 - w1 * y0) / det;
-    }
-    if (na < 0) {
-        na = 0;
-        nb = y1 / w2;
-    } else if (nb < 0) {
-        na = y0 / w0;
-        nb = 0;
-    }
-    *a = na;
-    *b = nb;
-}
-
-static void fit_variances(const struct variance *list, int n, double *ret_a, double *ret_b)
-{
-    double mean = 0, nu = 0;
-    for (int i = 0; i < n; i++) {
-        mean += list[i].nu * list[i].s2;
+        const double shape = 1 + t * list[i].v2;
+        logs += list[i].nu * log(shape);
+        sum += list[i].nu * list[i].s2 / shape;
         nu += list[i].nu;
     }
-    double a = mean / nu, b = 0;
-    const double least = 1e-12 * a;
-    for (int k = 0; k < NOISE_ROUNDS; k++) {
-        const double a0 = a, b0 = b;
-        score(list, n, least, &a, &b);
-        if (fabs(a - a0) <= 1e-9 * a && fabs(b - b0) <= 1e-9 * b)
-            break;
+    *ret_a = sum / nu;
+    return nu * log(sum / nu) + logs;
+}
+
+// Golden section in log t, between two values of it.
+static double refine(const struct variance *list, int n, double low, double high)
+{
+    const double golden = 0.5 * (sqrt(5.0) - 1);
+    double a;
+    for (int k = 0; k < 40; k++) {
+        const double left = high - golden * (high - low), right = low + golden * (high - low);
+        if (deviance(list, n, exp(left), &a) < deviance(list, n, exp(right), &a))
+            high = right;
+        else
+            low = left;
     }
-    *ret_a = a;
-    *ret_b = b;
+    return exp(0.5 * (low + high));
+}
+
+// Signals span five decades and the beam stands alone at their top: scoring steps wander there, so
+// t is searched over all its decades. t = 0 is a pure floor; at the other end the floor is nothing.
+static void fit_variances(const struct variance *list, int n, double *ret_a, double *ret_b)
+{
+    double t = 0, a, best = deviance(list, n, 0, &a);
+    for (double l = log(1e-3); l < log(1e16); l += 1) {
+        const double d = deviance(list, n, exp(l), &a);
+        if (d < best) {
+            best = d;
+            t = exp(l);
+        }
+    }
+    if (t > 0)
+        t = refine(list, n, log(t) - 1, log(t) + 1);
+    deviance(list, n, t, ret_a);
+    *ret_b = *ret_a * t;
 }
 
 struct reduce_noise reduce_noise_of(const struct plan *plan, const struct store_reading *rows,
