@@ -89,12 +89,18 @@ void fitview_print(const json_t *fit)
         out_warn("%s", json_string_value(warning) ? json_string_value(warning) : "");
 }
 
+static void quantity(const json_t *of, const char *key, char *text, size_t size)
+{
+    const json_t *q = json_object_get(of, key);
+    out_value(text, size, number(q, "value"), number(q, "u"));
+}
+
 void fitview_line(const json_t *fit, char *text, unsigned long size)
 {
-    const json_t *params = json_object_get(fit, "params"), *more = json_object_get(fit, "derived");
-    const json_t *sigma = json_object_get(params, "sigma"), *kd = json_object_get(params, "kd");
-    const json_t *r0 = json_object_get(more, "ks_r0");
-    snprintf(text, size, "sigma %.5g ±%.1g, kd %.4g ±%.1g, ks*R(0) %.4g ±%.1g, Delta %.3g",
-             number(sigma, "value"), number(sigma, "u"), number(kd, "value"), number(kd, "u"),
-             number(r0, "value"), number(r0, "u"), number(fit, "delta"));
+    const json_t *params = json_object_get(fit, "params");
+    char sigma[60], kd[60], r0[60];
+    quantity(params, "sigma", sigma, sizeof sigma);
+    quantity(params, "kd", kd, sizeof kd);
+    quantity(json_object_get(fit, "derived"), "ks_r0", r0, sizeof r0);
+    snprintf(text, size, "sigma %s, kd %s, ks*R(0) %s, Delta %.3g", sigma, kd, r0, number(fit, "delta"));
 }

@@ -59,13 +59,6 @@ static void time_left(double left_s, char *text, size_t size)
         snprintf(text, size, "%.0f h %02.0f min left", floor(left_s / 3600), floor(fmod(left_s, 3600) / 60));
 }
 
-static void bar(double part, char *text)
-{
-    *text = 0;
-    for (int i = 0; i < BAR; i++)
-        strcat(text, i < (int)(part * BAR + 0.5) ? "█" : "░");
-}
-
 static void where(const json_t *e, char *text, size_t size)
 {
     int sweep = whole(e, "sweep"), sweeps = whole(e, "sweeps");
@@ -75,25 +68,36 @@ static void where(const json_t *e, char *text, size_t size)
         snprintf(text, size, "dark and beam");
 }
 
-// The live line. It is short enough for 110 columns; a narrower terminal loses its end.
+static int width(const char *text)
+{
+    int n = 0;
+    for (; *text; text++)
+        n += (*text & 0xc0) != 0x80;
+    return n;
+}
+
+// The bar gives way on a narrow terminal; whether the laser is on must be seen.
+static void bar(double part, int room, char *text)
+{
+    int cells = room > BAR ? BAR : room;
+    *text = 0;
+    for (int i = 0; i < cells; i++)
+        strcat(text, i < (int)(part * cells + 0.5) ? "█" : "░");
+}
+
 static void show_reading(struct follow *f, const json_t *e)
 {
-    char filled[BAR * 4 + 1], left[40], value[60] = "", sweep[60], line[400];
+    char filled[BAR * 4 + 1], left[40], value[60] = "", sweep[60], rest[300];
     double part = whole(e, "total") > 0 ? (double)whole(e, "done") / whole(e, "total") : 0;
-    double f_r = number(e, "f_r_per_sr"), u = number(e, "u_f_r_per_sr");
-    bar(part, filled);
-    time_left(number(e, "left_s"), left, sizeof left);
-    if (isfinite(f_r))
-        snprintf(value, sizeof value, "f_r %.4g ±%.1g /sr", f_r, u);
     where(e, sweep, sizeof sweep);
-    int n = snprintf(line, sizeof line, "%s  %s %3.0f%%  θr %7.2f°  %s   %s   laser %s", sweep, filled,
-                     100 * part, number(e, "theta_r_deg"), value, left,
-                     json_is_true(json_object_get(e, "emission")) ? "ON" : "off");
-    int columns = out_columns(stderr), seen = 0;
-    for (int i = 0; i < n; i++)
-        if ((line[i] & 0xc0) != 0x80 && ++seen >= columns)
-            line[n = i] = 0;
-    fprintf(stderr, "\r%s\033[K", line);
+    time_left(number(e, "left_s"), left, sizeof left);
+    if (isfinite(number(e, "f_r_per_sr")))
+        out_value(value, sizeof value, number(e, "f_r_per_sr"), number(e, "u_f_r_per_sr"));
+    snprintf(rest, sizeof rest, "%3.0f%%  θr %6.2f°  %s%s%s  %s  laser %s", 100 * part, number(e, "theta_r_deg"),
+             *value ? "f_r " : "", value, *value ? " /sr" : "", left,
+             json_is_true(json_object_get(e, "emission")) ? "ON" : "off");
+    bar(part, out_columns(stderr) - width(sweep) - width(rest) - 4, filled);
+    fprintf(stderr, "\r%s  %s %s\033[K", sweep, filled, rest);
     fflush(stderr);
     f->line_shown = true;
 }

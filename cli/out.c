@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <jansson.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,6 +62,16 @@ void out_warn(const char *fmt, ...)
     va_start(ap, fmt);
     say("warning: ", OUT_YELLOW, fmt, ap);
     va_end(ap);
+}
+
+void out_value(char *text, size_t size, double value, double u)
+{
+    if (!isfinite(u) || u <= 0 || u > 1e6) {
+        snprintf(text, size, "%.4g", value);
+        return;
+    }
+    int decimals = (int)fmin(9, fmax(0, -floor(log10(u))));
+    snprintf(text, size, "%.*f ±%.*f", decimals, value, decimals, u);
 }
 
 int out_fail(const struct gon_error *err)

@@ -5,6 +5,7 @@
 #include "base/err.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdio.h>
 
 struct json_t; // of jansson
@@ -19,6 +20,9 @@ const char *out_end(FILE *out);
 
 void out_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));  // "gonio: ..." on stderr
 void out_warn(const char *fmt, ...) __attribute__((format(printf, 1, 2))); // "warning: ..." on stderr
+
+// "0.0317 ±0.0006": as many decimals as the first digit of u needs; without u, four digits.
+void out_value(char *text, size_t size, double value, double u);
 
 // Says the error and returns the exit status that its code stands for.
 int out_fail(const struct gon_error *err);
