@@ -52,11 +52,14 @@ static int settle(struct instrument *in, const struct acquire *a, int64_t since_
     return 0;
 }
 
-// An answer that is no number is never one: asked again, and after that an error.
-static int sample(struct instrument *in, struct detector_sample *ret_sample, struct gon_error *err)
+// An answer that is no number is never one: asked again, and after that an error. The value is that
+// of the moment it was asked for.
+static int sample(struct instrument *in, struct detector_sample *ret_sample, int64_t *ret_asked_ns,
+                  struct gon_error *err)
 {
     int rc = 0;
     for (int i = 0; i < SAMPLE_TRIES; i++) {
+        *ret_asked_ns = instrument_now_ns(in);
         rc = instrument_sample(in, ret_sample, err);
         if (rc != GON_E_LINK)
             break;
@@ -90,9 +93,9 @@ static double sd(const struct tally *t)
 // against it.
 static int first_sample(struct instrument *in, const struct acquire *a, int64_t since_ns,
                         const struct cancel *cancel, struct detector_sample *ret_sample,
-                        struct gon_error *err)
+                        int64_t *ret_asked_ns, struct gon_error *err)
 {
-    int rc = sample(in, ret_sample, err);
+    int rc = sample(in, ret_sample, ret_asked_ns, err);
     if (rc < 0)
         return rc;
     const double fall = fmax(fabs(ret_sample->signal_v) / a->last_signal_v, FALL_MOST);
@@ -101,9 +104,8 @@ static int first_sample(struct instrument *in, const struct acquire *a, int64_t 
         return 0;
     if (instrument_wait(in, until_ns, cancel) < 0)
         return gon_fail(err, GON_E_CANCELED, "stopped while settling");
-    unsigned overload; // that of the old signal
-    rc = instrument_condition(in, &overload, err);
-    return rc < 0 ? rc : sample(in, ret_sample, err);
+    rc = instrument_clear(in, err); // the overload of the old signal
+    return rc < 0 ? rc : sample(in, ret_sample, ret_asked_ns, err);
 }
 
 // Saturated samples end it: more of them say nothing more.
@@ -120,12 +122,14 @@ static int take_samples(struct instrument *in, const struct acquire *a,
         struct detector_sample s;
         if (instrument_wait(in, next_ns, cancel) < 0)
             return gon_fail(err, GON_E_CANCELED, "stopped while reading");
-        int rc = k ? sample(in, &s, err) : first_sample(in, a, wish->since_ns, cancel, &s, err);
+        int64_t asked_ns;
+        int rc = k ? sample(in, &s, &asked_ns, err)
+                   : first_sample(in, a, wish->since_ns, cancel, &s, &asked_ns, err);
         if (rc < 0)
             return rc;
         if (k == 0)
             r->utc_ns = instrument_utc_ns(in);
-        next_ns = instrument_now_ns(in) + spacing_ns;
+        next_ns = asked_ns + spacing_ns;
         add(&signal, s.signal_v);
         add(&monitor, s.monitor_v);
         if (fabs(s.signal_v) >= SATURATED * full_v)
@@ -202,8 +206,8 @@ int acquire_attempt(struct instrument *in, struct acquire *a, const struct acqui
     r.range = a->range;
     if (rc >= 0)
         rc = settle(in, a, wish->since_ns, cancel, err);
-    if (rc >= 0) // clears what happened on the way
-        rc = instrument_condition(in, &condition, err);
+    if (rc >= 0) // what happened on the way
+        rc = instrument_clear(in, err);
     if (rc >= 0)
         rc = take_samples(in, a, wish, cancel, &r, err);
     if (rc >= 0)

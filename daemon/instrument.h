@@ -157,5 +157,6 @@ int instrument_set_up(struct instrument *in, struct gon_error *err);
 int instrument_set_range(struct instrument *in, int range, struct gon_error *err);
 int instrument_sample(struct instrument *in, struct detector_sample *ret_sample,
                       struct gon_error *err);
+int instrument_clear(struct instrument *in, struct gon_error *err); // as detector.h
 int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err);
 double instrument_time_constant_s(const struct instrument *in); // as the device has it

@@ -252,6 +252,16 @@ int instrument_sample(struct instrument *in, struct detector_sample *ret_sample,
     return rc;
 }
 
+int instrument_clear(struct instrument *in, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = instrument_need(in, PART_DETECTOR, err);
+    return rc < 0 ? rc
+                  : instrument_note(in, PART_DETECTOR, in->detector->ops->clear(in->detector, err),
+                                    err);
+}
+
 int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err)
 {
     struct gon_error own;

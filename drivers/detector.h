@@ -46,7 +46,9 @@ struct detector_ops {
     double (*full_scale_v)(struct detector *d, int range);
     int (*set_range)(struct detector *d, int range, struct gon_error *err); // read back
     int (*sample)(struct detector *d, struct detector_sample *ret_sample, struct gon_error *err);
-    // What happened since the last call, which clears it. Flags of detector_flag.
+    // Forgets the overloads and losses of reference so far (those of the way here): one query.
+    int (*clear)(struct detector *d, struct gon_error *err);
+    // What happened since clear or the last call, which clears it. Flags of detector_flag.
     int (*condition)(struct detector *d, unsigned *ret_flags, struct gon_error *err);
     int (*reopen)(struct detector *d, struct gon_error *err);
     void (*free)(struct detector *d);

@@ -234,6 +234,14 @@ static int sample(struct detector *d, struct detector_sample *ret_sample, struct
     return 0;
 }
 
+// *CLS would clear the events too, and with them the sign of a restart.
+static int clear(struct detector *d, struct gon_error *err)
+{
+    int lias;
+    sr_of(d)->clipped = false;
+    return ask_int(sr_of(d), "LIAS?", 255, &lias, err);
+}
+
 static int condition(struct detector *d, unsigned *ret_flags, struct gon_error *err)
 {
     struct sr830 *z = sr_of(d);
@@ -273,9 +281,16 @@ static void sr830_free(struct detector *d)
 int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *cancel,
                         struct detector **ret_detector, struct gon_error *err)
 {
-    static const struct detector_ops ops = {identify,   setup,        ranges,
-                                            full_scale, set_range,    sample,
-                                            condition,  sr830_reopen, sr830_free};
+    static const struct detector_ops ops = {.identify = identify,
+                                            .setup = setup,
+                                            .ranges = ranges,
+                                            .full_scale_v = full_scale,
+                                            .set_range = set_range,
+                                            .sample = sample,
+                                            .clear = clear,
+                                            .condition = condition,
+                                            .reopen = sr830_reopen,
+                                            .free = sr830_free};
     struct transport *t;
     int rc = transport_open(link, clk, cancel, &t, err);
     if (rc < 0)

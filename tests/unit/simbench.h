@@ -387,6 +387,16 @@ static inline int simbench_detector_condition(struct detector *d, unsigned *ret,
     return 0;
 }
 
+static inline int simbench_detector_clear(struct detector *d, struct gon_error *err)
+{
+    struct simbench *b = simbench_of_detector(d);
+    bool done;
+    int rc = simbench_call(b, SIMBENCH_DETECTOR, &done, err);
+    if (rc >= 0)
+        b->world.lockin.condition = 0;
+    return rc;
+}
+
 static inline int simbench_detector_reopen(struct detector *d, struct gon_error *err)
 {
     bool done;
@@ -419,6 +429,7 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
                                                      .full_scale_v = simbench_full_scale_v,
                                                      .set_range = simbench_detector_set_range,
                                                      .sample = simbench_detector_sample,
+                                                     .clear = simbench_detector_clear,
                                                      .condition = simbench_detector_condition,
                                                      .reopen = simbench_detector_reopen,
                                                      .free = simbench_detector_free};

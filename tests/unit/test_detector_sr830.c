@@ -256,6 +256,19 @@ static void conditions_are_told_once(void **state)
     d->ops->free(d);
 }
 
+static void what_was_cleared_is_not_told(void **state)
+{
+    (void)state;
+    struct gon_error err;
+    struct detector *d = begin_ready(26);
+    bench.world.lockin.condition = 1;
+    assert_int_equal(d->ops->clear(d, &err), 0);
+    assert_int_equal(condition(d), 0);
+    bench.world.lockin.condition = 1;
+    assert_int_equal(condition(d), DETECTOR_SATURATED);
+    d->ops->free(d);
+}
+
 static void a_range_changed_at_the_front_panel_is_seen(void **state)
 {
     (void)state;
@@ -398,6 +411,7 @@ int main(void)
         cmocka_unit_test(a_sample_is_signal_frequency_and_monitor),
         cmocka_unit_test(what_is_no_reading_never_becomes_one),
         cmocka_unit_test(conditions_are_told_once),
+        cmocka_unit_test(what_was_cleared_is_not_told),
         cmocka_unit_test(a_range_changed_at_the_front_panel_is_seen),
         cmocka_unit_test(a_restart_is_survived_and_told_until_set_up_again),
         cmocka_unit_test(a_sample_near_full_scale_counts_as_saturated),
