@@ -177,11 +177,16 @@ static int run_stop(const struct verb *verb, int argc, char **argv)
 {
     json_t *reply = NULL;
     int status = command(verb, argc, argv, "/api/v1/stop", &reply), run = whole(reply, "run");
+    bool off = json_is_true(json_object_get(reply, "laser_off"));
     if (reply && run)
-        fprintf(stderr, "run %d %s: laser off, axes halted. Go on with: gonio resume %d\n", run,
-                text_of(reply, "state"), run);
+        fprintf(stderr, "run %d %s%s. Go on with: gonio resume %d\n", run, text_of(reply, "state"),
+                off ? ": laser off, axes halted" : "", run);
     else if (reply)
-        fprintf(stderr, "nothing was running; laser off and axes halted all the same\n");
+        fprintf(stderr, "nothing was running%s\n", off ? "; laser off and axes halted all the same" : "");
+    if (reply && !off) {
+        out_say("the laser does not confirm that it is off: use its key or the interlock; see: gonio status");
+        status = EXIT_FAILED;
+    }
     json_decref(reply);
     return status;
 }

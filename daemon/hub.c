@@ -57,6 +57,21 @@ static void answer_stops(struct hub *h, int status, const char *body)
     h->stop_count = 0;
 }
 
+// Read back off by a laser that can be reached; anything else must not be called off.
+static bool laser_is_off(const struct hub *h)
+{
+    const struct instrument_snapshot *s = h->snapshot;
+    return s && s->part[PART_LASER].link == PART_OK && !s->emission && !s->off_unconfirmed;
+}
+
+static void answer_stopped(struct hub *h, json_t *o)
+{
+    json_object_set_new(o, "laser_off", json_boolean(laser_is_off(h)));
+    char *body = view_text(o);
+    answer_stops(h, 200, body ? body : "{}");
+    free(body);
+}
+
 // In the file's history; how a run ended goes there when it is closed.
 static void keep_state(struct hub *h, const struct run *run)
 {
@@ -80,11 +95,8 @@ static void changed(void *ctx, const struct run *run)
     publish(h, "state", view_run(run, false));
     if (run == queue_active(h->queue))
         keep_state(h, run);
-    if (queue_idle(h->queue) && h->stop_count) {
-        char *body = view_text(view_run(run, false));
-        answer_stops(h, 200, body ? body : "{}");
-        free(body);
-    }
+    if (queue_idle(h->queue) && h->stop_count)
+        answer_stopped(h, view_run(run, false));
 }
 
 static void happened(struct hub *h, const struct note *n)
@@ -246,10 +258,7 @@ void hub_stop(struct hub *h, const char *why, uint64_t ticket)
         http_answer(h->http, ticket, 503, http_error("a stop is under way", NULL, "see: gonio status"));
     else
         h->stops[h->stop_count++] = ticket;
-    bool any = queue_stop(h->queue, why);
-    if (any && queue_idle(h->queue))
-        answer_stops(h, 200, "{\"run\":null,\"state\":\"idle\"}"); // only waiting runs were put back
-    else if (!any)
+    if (!queue_stop(h->queue, why))
         note_post(h->run_box, note_new(NOTE_HALT));
 }
 
@@ -300,7 +309,7 @@ static void halted(struct hub *h, const struct note *n)
         answer_stops(h, 500, body);
         free(body);
     } else {
-        answer_stops(h, 200, "{\"run\":null,\"state\":\"idle\"}");
+        answer_stopped(h, json_pack("{s:n, s:s}", "run", "state", "idle"));
     }
 }
 

@@ -118,18 +118,26 @@ static void ended(void *ctx, const struct gon_error *err)
     loop_quit(d->loop);
 }
 
+static const char *axes_text(const struct instrument_snapshot *s)
+{
+    bool homed = true;
+    for (int i = 0; i < INSTRUMENT_AXES; i++) {
+        if (s->part[i].link == PART_LOST)
+            return "not all reachable";
+        homed = homed && (s->part[i].link == PART_ABSENT || s->axis[i].homed);
+    }
+    return homed ? "homed" : "not homed (a run homes them first)";
+}
+
 static void ready(void *ctx, const struct instrument_snapshot *s)
 {
     (void)ctx;
-    bool homed = true;
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
-        if (s->part[i].link == PART_OK && !s->axis[i].homed)
-            homed = false;
     for (int i = 0; i < PART_COUNT; i++)
         if (s->part[i].link == PART_LOST)
             printf("waiting for %s: %s\n", s->part[i].name, s->part[i].problem);
-    printf("ready: axes %s, laser %s.   Ctrl-C stops (laser off first).\n",
-           homed ? "homed" : "not homed (a run homes them first)", s->emission ? "ON" : "off");
+    bool lost = s->part[PART_LASER].link != PART_OK, on = s->emission || s->off_unconfirmed || s->laser.emission;
+    printf("ready: axes %s, laser %s.   Ctrl-C stops (laser off first).\n", axes_text(s),
+           lost ? "not reachable" : on ? "NOT OFF: use its key or the interlock" : "off");
     fflush(stdout);
 }
 

@@ -227,6 +227,7 @@ static void halt(struct runner *r)
     if (travel_stop(r->in, &axes) < 0 && rc == 0)
         n->err = axes;
     r->halt = false;
+    send_snapshot(r);
     note_post(r->links.to_main, n);
 }
 

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from conftest import BUILD, PATIENCE_S, SMALL, Program
+from conftest import BUILD, PATIENCE_S, QUICK_LASER, SMALL, Program
 
 TINY = """\
 campaign: {
@@ -249,6 +249,30 @@ def test_a_second_daemon_is_refused(daemon):
     r = subprocess.run([BUILD / "goniod", "--sim"], env={**os.environ, **daemon.env}, capture_output=True, text=True,
                        timeout=PATIENCE_S, check=False)
     assert r.returncode == 4 and f"already running, pid {daemon.pid}" in r.stderr
+
+
+def test_a_bench_that_is_not_there_is_named_and_waited_for(start_sim, start_daemon, tmp_path):
+    sim = start_sim("--fast", *QUICK_LASER)
+    for wire in ("axes-tcp", "laser-tcp"):
+        assert sim.control(do="unplug", wire=wire)["ok"]
+    d = start_daemon("--config", sim.folder / "goniod-tcp.cfg")
+    assert any(line.startswith("waiting for laser: ") for line in d.said)
+    assert "laser not reachable" in d.said[-1]
+    devices = {e["name"]: e["link"] for e in d.status()["devices"]}
+    assert devices["laser"] == devices["theta_i"] == "lost" and devices["detector"] == "ok"
+    reply = d.submit(TINY)
+    stream = d.follow(reply["event_id"])
+    stream.until_state(reply["run"], "paused")
+    r = d.gonio("stop")  # the run ends, but nobody may say that the laser is off
+    assert r.returncode == 1 and "laser off" not in r.stderr and "use its key or the interlock" in r.stderr
+    assert d.gonio("resume", reply["run"], "--detach").returncode == 0
+    stream.until(lambda e: e["event"] == "state" and e["state"] == "paused" and e["id"] > reply["event_id"] + 3)
+    for wire in ("axes-tcp", "laser-tcp"):
+        assert sim.control(do="plug", wire=wire)["ok"]
+    stream.until_state(reply["run"], "running")
+    stream.close()
+    r = d.gonio("stop")
+    assert r.returncode == 0 and "laser off, axes halted" in r.stderr
 
 
 def test_the_daemon_over_tcp_and_a_given_simulator(start_sim, start_daemon):

@@ -84,7 +84,7 @@ def test_nothing_to_pause_or_resume_is_a_conflict(daemon):
 def test_a_stop_with_nothing_to_stop_halts_all_the_same(daemon):
     before = daemon.bench.control(do="state")["laser"]["offs"]
     status, reply = daemon.request("POST", "/api/v1/stop")
-    assert status == 200 and reply["run"] is None
+    assert status == 200 and reply["run"] is None and reply["laser_off"] is True
     assert daemon.bench.control(do="state")["laser"]["offs"] > before
 
 
