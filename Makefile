@@ -112,8 +112,7 @@ system: all $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
 PARALLEL = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc))
 check: deps-check
 	$(Q)$(MAKE) --no-print-directory $(PARALLEL) all layers $(UNIT_TESTS:%=$(B)/tests/%)
-	$(Q)$(MAKE) --no-print-directory unit
-	$(Q)$(MAKE) --no-print-directory system
+	$(Q)$(MAKE) --no-print-directory -Otarget -j2 unit system
 
 layers:
 	$(Q)scripts/layers
