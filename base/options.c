@@ -83,8 +83,9 @@ static int unknown(const struct option_row *rows, const char *name, size_t lengt
     for (int i = 0; i < MOST_ROWS && rows[i].name; i++)
         words[i] = rows[i].name;
     const char *meant = options_suggest(typed, words);
-    return meant ? gon_fail(err, GON_E_INPUT, "unknown option '%s'; did you mean '%s'?", typed, meant)
-                 : gon_fail(err, GON_E_INPUT, "unknown option '%s'; see --help", typed);
+    return meant
+               ? gon_fail(err, GON_E_INPUT, "unknown option '%s'; did you mean '%s'?", typed, meant)
+               : gon_fail(err, GON_E_INPUT, "unknown option '%s'; see --help", typed);
 }
 
 static int take_number(const struct option_row *row, const char *text, void *target,
@@ -134,7 +135,8 @@ static int take_option(int argc, char **argv, int i, const struct option_row *ro
         return 1;
     }
     if (!value && i + 1 >= argc)
-        return gon_fail(err, GON_E_INPUT, "%s needs a value: %s %s", row->name, row->name, row->value);
+        return gon_fail(err, GON_E_INPUT, "%s needs a value: %s %s", row->name, row->name,
+                        row->value);
     int rc = take_value(row, value ? value : argv[i + 1], target, err);
     return rc < 0 ? rc : value ? 1 : 2;
 }

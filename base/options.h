@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Command lines, checked against a table: --name VALUE, --name=VALUE, --flag; -h is --help; "--" ends
-// the options; everything else is an operand. A mistake is one sentence with what was meant, if that can
-// be guessed. Texts are borrowed from argv. Thread: any.
+// Command lines, checked against a table: --name VALUE, --name=VALUE, --flag; -h is --help; "--"
+// ends the options; everything else is an operand. A mistake is one sentence with what was meant,
+// if that can be guessed. Texts are borrowed from argv. Thread: any.
 #pragma once
 #include "base/err.h"
 
@@ -24,16 +24,17 @@ struct option_row {
     const char *help;  // one sentence without its full stop
 };
 
-// argv[0] is skipped. Returns the count of operands, put in order into operands, or GON_E_INPUT when an
-// option is unknown or wrong or there are more than most operands.
+// argv[0] is skipped. Returns the count of operands, put in order into operands, or GON_E_INPUT
+// when an option is unknown or wrong or there are more than most operands.
 int options_take(int argc, char **argv, const struct option_row *rows, void *target,
                  const char **operands, int most, struct gon_error *err);
 
 void options_describe(FILE *out, const struct option_row *rows); // one line an option, for --help
 
-void options_manual(FILE *out, const struct option_row *rows);   // the same as scdoc text, for man pages
+void options_manual(FILE *out, const struct option_row *rows);   // the same as scdoc text
 
-// Which of the words (NULL at their end) may have been meant by a mistyped one; NULL when none is near.
+// Which of the words (NULL at their end) may have been meant by a mistyped one; NULL when none is
+// near.
 const char *options_suggest(const char *typed, const char *const *words);
 
 // A whole text as a number with a decimal point, whatever the locale: 0, or GON_E_INPUT.

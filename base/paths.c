@@ -19,8 +19,10 @@ int paths_socket_fits(const char *path, struct gon_error *err)
     if (!*path)
         return gon_fail(err, GON_E_INPUT, "the socket's path is empty");
     if (strlen(path) > most)
-        return gon_fail(err, GON_E_INPUT, "socket path %s is %zu bytes long, at most %zu fit; choose a shorter one with --socket",
-                        path, strlen(path), most);
+        return gon_fail(
+            err, GON_E_INPUT,
+            "socket path %s is %zu bytes long, at most %zu fit; choose a shorter one with --socket",
+            path, strlen(path), most);
     return GON_OK;
 }
 

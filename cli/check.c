@@ -18,7 +18,8 @@ struct options {
 };
 
 static const struct option_row rows[] = {
-    {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print {\"file\", \"kind\", \"errors\": [...]}"},
+    {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0,
+     "print {\"file\", \"kind\", \"errors\": [...]}"},
     {"--settings", OPTION_TEXT, offsetof(struct options, settings), "KIND", 0, 0,
      "print all settings of campaign or bench files as manual text"},
     VERB_OPTIONS_END,
@@ -87,7 +88,9 @@ static const char *kind_of(const char *path)
 {
     struct cfg_file *f = cfg_open(path, (struct cfg_sink){quiet, NULL});
     const char *text = f ? cfg_text(f) : "";
-    const char *kind = has_group(text, "campaign") ? "campaign" : has_group(text, "bench") ? "bench" : NULL;
+    const char *kind = has_group(text, "campaign") ? "campaign"
+                       : has_group(text, "bench")  ? "bench"
+                                                   : NULL;
     if (!kind)
         kind = strstr(path, "goniod") || strstr(path, "bench") ? "bench" : "campaign";
     cfg_close(f);
@@ -143,7 +146,11 @@ static int run_check(const struct verb *verb, int argc, char **argv)
 }
 
 const struct verb verb_check = {
-    "check", "FILE.cfg", "validate a campaign or bench file, nothing else",
-    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen from its\n"
+    "check",
+    "FILE.cfg",
+    "validate a campaign or bench file, nothing else",
+    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen "
+    "from its\n"
     "groups. A campaign's meaning, with its estimated time: gonio plan FILE.cfg\n",
-    rows, run_check};
+    rows,
+    run_check};

@@ -66,9 +66,10 @@ static int no_daemon(const struct client *c, CURLcode code, struct gon_error *er
 {
     if (code == CURLE_COULDNT_CONNECT)
         return gon_fail(err, GON_E_GONE,
-                        "no daemon at %s; start it: goniod --sim (or goniod --config goniod.cfg)", c->socket);
-    return gon_fail(err, GON_E_GONE, "the daemon at %s does not answer: %s; see: gonio status", c->socket,
-                    curl_easy_strerror(code));
+                        "no daemon at %s; start it: goniod --sim (or goniod --config goniod.cfg)",
+                        c->socket);
+    return gon_fail(err, GON_E_GONE, "the daemon at %s does not answer: %s; see: gonio status",
+                    c->socket, curl_easy_strerror(code));
 }
 
 static void prepare(struct client *c, const char *path)
@@ -110,11 +111,12 @@ static enum gon_code code_of(long status)
 static int refused(long status, const json_t *reply, struct gon_error *err)
 {
     const char *error = NULL, *where = NULL, *next = NULL;
-    json_unpack((json_t *)reply, "{s?s, s?s, s?s}", "error", &error, "where", &where, "what_to_do", &next);
+    json_unpack((json_t *)reply, "{s?s, s?s, s?s}", "error", &error, "where", &where, "what_to_do",
+                &next);
     if (!error)
         return gon_fail(err, code_of(status), "the daemon answered with HTTP status %ld", status);
-    return gon_fail(err, code_of(status), "%s%s%s%s%s", where ? where : "", where ? ": " : "", error,
-                    next ? "; " : "", next ? next : "");
+    return gon_fail(err, code_of(status), "%s%s%s%s%s", where ? where : "", where ? ": " : "",
+                    error, next ? "; " : "", next ? next : "");
 }
 
 static int understand(long status, const struct reply *r, json_t **ret_reply, struct gon_error *err)
@@ -125,8 +127,8 @@ static int understand(long status, const struct reply *r, json_t **ret_reply, st
     if (status < 200 || status > 299)
         rc = refused(status, reply, err);
     else if (!reply)
-        rc = gon_fail(err, GON_E_SYSTEM, "the daemon's answer is no JSON: line %d column %d: %s", e.line,
-                      e.column, e.text);
+        rc = gon_fail(err, GON_E_SYSTEM, "the daemon's answer is no JSON: line %d column %d: %s",
+                      e.line, e.column, e.text);
     if (rc < 0)
         json_decref(reply);
     else
@@ -198,7 +200,8 @@ static bool readable(int fd)
 }
 
 // One connection: until the follower has enough, an interrupt, or its end (ret_code, ret_status).
-static int stream_once(CURLM *multi, CURL *curl, int interrupt_fd, CURLcode *ret_code, long *ret_status)
+static int stream_once(CURLM *multi, CURL *curl, int interrupt_fd, CURLcode *ret_code,
+                       long *ret_status)
 {
     int running = 1;
     curl_multi_add_handle(multi, curl);
@@ -274,12 +277,14 @@ int client_follow(struct client *c, const char *last_id, int interrupt_fd,
         if (rc < 0 || f.enough)
             break;
         if (!f.away) {
-            follower->trouble(follower->ctx, "the connection to the daemon broke; trying again for 10 s");
+            follower->trouble(follower->ctx,
+                              "the connection to the daemon broke; trying again for 10 s");
             away_since_ns = clk_now_ns(clk_system());
             f.away = true;
         } else if (was_away && clk_now_ns(clk_system()) - away_since_ns > AWAY_NS) {
             rc = gon_fail(err, GON_E_GONE,
-                          "the daemon at %s went away; start it again, then see: gonio list", c->socket);
+                          "the daemon at %s went away; start it again, then see: gonio list",
+                          c->socket);
         }
         pause_for(interrupt_fd);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The command's end of the daemon's HTTP: JSON requests over the Unix socket, and the event stream, which
-// reconnects and goes on after the last event it saw. Thread: one.
+// The command's end of the daemon's HTTP: JSON requests over the Unix socket, and the event stream,
+// which reconnects and goes on after the last event it saw. Thread: one.
 #pragma once
 #include "base/err.h"
 
@@ -14,11 +14,11 @@ int client_new(const char *socket, struct client **ret_client, struct gon_error 
 void client_free(struct client *c);
 const char *client_socket(const struct client *c);
 
-// body NULL: none. The reply is the caller's to json_decref. GON_E_GONE: no daemon; GON_E_INPUT: 400, 404,
-// 413, 422; GON_E_REFUSED: 409, 429, 503; GON_E_SYSTEM: anything else. err then holds what the daemon said,
-// where, and what to do.
-int client_request(struct client *c, const char *method, const char *path, const struct json_t *body,
-                   struct json_t **ret_reply, struct gon_error *err);
+// body NULL: none. The reply is the caller's to json_decref. GON_E_GONE: no daemon; GON_E_INPUT:
+// 400, 404, 413, 422; GON_E_REFUSED: 409, 429, 503; GON_E_SYSTEM: anything else. err then holds
+// what the daemon said, where, and what to do.
+int client_request(struct client *c, const char *method, const char *path,
+                   const struct json_t *body, struct json_t **ret_reply, struct gon_error *err);
 
 struct client_follower {
     void *ctx;
@@ -26,7 +26,7 @@ struct client_follower {
     void (*trouble)(void *ctx, const char *text);          // the connection broke or is back
 };
 
-// Follows the events after last_id until the follower has enough (0), fd interrupt_fd becomes readable
-// (GON_E_CANCELED), or the daemon stays away for 10 s (GON_E_GONE).
+// Follows the events after last_id until the follower has enough (0), fd interrupt_fd becomes
+// readable (GON_E_CANCELED), or the daemon stays away for 10 s (GON_E_GONE).
 int client_follow(struct client *c, const char *last_id, int interrupt_fd,
                   const struct client_follower *follower, struct gon_error *err);

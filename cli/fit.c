@@ -24,21 +24,27 @@ struct options {
 };
 
 static const struct option_row rows[] = {
-    {"--column", OPTION_TEXT, offsetof(struct options, column), "NAME", 0, 0, "the CSV's value column (f_r)"},
+    {"--column", OPTION_TEXT, offsetof(struct options, column), "NAME", 0, 0,
+     "the CSV's value column (f_r)"},
     {"--theta-i-max", OPTION_REAL, offsetof(struct options, theta_i_max_deg), "DEG", 0, 90,
      "leave out larger angles of incidence"},
-    {"--theta-i", OPTION_TEXT, offsetof(struct options, angles), "LIST", 0, 0, "only these: 0,10,20"},
+    {"--theta-i", OPTION_TEXT, offsetof(struct options, angles), "LIST", 0, 0,
+     "only these: 0,10,20"},
     {"--weights", OPTION_TEXT, offsetof(struct options, words.weights), "W", 0, 0,
      "uniform, dense:G, relative or variance (variance when every value has u_f_r)"},
     {"--method", OPTION_TEXT, offsetof(struct options, words.method), "M", 0, 0,
      "memetic, or paper: its binary genetic algorithm (memetic)"},
     {"--diffuse", OPTION_TEXT, offsetof(struct options, words.diffuse), "D", 0, 0,
      "paper: kd/cos(theta_i), or lambert: kd/pi (paper)"},
-    {"--bounds", OPTION_TEXT, offsetof(struct options, words.bounds), "LIST", 0, 0, "n=0.2:8,k=0:10,..."},
-    {"--seed", OPTION_INT, offsetof(struct options, seed), "N", 0, 4294967295.0, "of the search (1)"},
+    {"--bounds", OPTION_TEXT, offsetof(struct options, words.bounds), "LIST", 0, 0,
+     "n=0.2:8,k=0:10,..."},
+    {"--seed", OPTION_INT, offsetof(struct options, seed), "N", 0, 4294967295.0,
+     "of the search (1)"},
     {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64, "workers (1)"},
-    {"--trace", OPTION_TEXT, offsetof(struct options, trace), "FILE", 0, 0, "write each generation's Delta as CSV"},
-    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0, "the folder of campaigns ($GONIO_DIR)"},
+    {"--trace", OPTION_TEXT, offsetof(struct options, trace), "FILE", 0, 0,
+     "write each generation's Delta as CSV"},
+    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
+     "the folder of campaigns ($GONIO_DIR)"},
     {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
     VERB_OPTIONS_END,
 };
@@ -62,7 +68,8 @@ static bool ends_with(const char *text, const char *end)
     return n >= m && !strcmp(text + n - m, end);
 }
 
-static int filter_of(const struct options *o, struct dataset_filter *ret_filter, struct gon_error *err)
+static int filter_of(const struct options *o, struct dataset_filter *ret_filter,
+                     struct gon_error *err)
 {
     struct dataset_filter f = dataset_filter_all();
     if (isfinite(o->theta_i_max_deg))
@@ -77,16 +84,18 @@ static int filter_of(const struct options *o, struct dataset_filter *ret_filter,
     return GON_OK;
 }
 
-// A number, a name, or a .gonio file is a campaign; anything else is a CSV. A campaign brings the options
-// of its configuration.
+// A number, a name, or a .gonio file is a campaign; anything else is a CSV. A campaign brings the
+// options of its configuration.
 static int load_campaign(const struct options *o, const char *file, struct dataset_filter *filter,
-                         struct dataset *ret_data, struct fit_options *options, struct gon_error *err)
+                         struct dataset *ret_data, struct fit_options *options,
+                         struct gon_error *err)
 {
     char directory[CATALOG_PATH], path[CATALOG_PATH];
     struct store *store = NULL;
     struct campaign_config config;
     if (o->column)
-        return gon_fail(err, GON_E_INPUT, "--column is for CSV files; a campaign has one value column");
+        return gon_fail(err, GON_E_INPUT,
+                        "--column is for CSV files; a campaign has one value column");
     int rc = catalog_directory(o->dir, directory, sizeof directory, err);
     rc = rc < 0 ? rc : catalog_resolve(directory, file, path, sizeof path, err);
     rc = rc < 0 ? rc : store_open(path, STORE_READ, &store, err);
@@ -109,8 +118,8 @@ static bool is_file(const char *path)
     return f || errno != ENOENT;
 }
 
-static int load(const struct options *o, const char *file, struct dataset *ret_data, struct fit_options *options,
-                struct gon_error *err)
+static int load(const struct options *o, const char *file, struct dataset *ret_data,
+                struct fit_options *options, struct gon_error *err)
 {
     struct dataset_filter filter;
     int rc = filter_of(o, &filter, err);
@@ -158,8 +167,10 @@ static int search(const struct dataset *data, const struct options *o, struct fi
     int stop = fit_run(&d, options, ret_result), rc = GON_OK;
     if (stop == FIT_E_CANCELED)
         rc = gon_fail(err, GON_E_CANCELED, "interrupted; nothing was fitted");
-    else if (stop == FIT_E_OPTIONS || stop == FIT_E_DATA || stop == FIT_E_ALL_ZERO || stop == FIT_E_FEW_POINTS)
-        rc = gon_fail(err, GON_E_INPUT, "%s: %s (%zu points)", data->source, fit_stop_text(stop), data->count);
+    else if (stop == FIT_E_OPTIONS || stop == FIT_E_DATA || stop == FIT_E_ALL_ZERO ||
+             stop == FIT_E_FEW_POINTS)
+        rc = gon_fail(err, GON_E_INPUT, "%s: %s (%zu points)", data->source, fit_stop_text(stop),
+                      data->count);
     else if (stop < 0)
         rc = gon_fail(err, GON_E_SYSTEM, "%s: %s", data->source, fit_stop_text(stop));
     if (trace && fclose(trace) != 0 && rc == 0)
@@ -178,10 +189,11 @@ static int print(const struct fit_record *record, const struct dataset *data, bo
         puts(text);
     } else {
         json_t *o = json_loads(text, 0, NULL);
-        fprintf(stderr, "%s: %zu points%s, %s weights, %s, seed %llu, %.0f ms\n", data->source, record->points,
-                data->left_out ? " (others left out by the filter)" : "",
-                fit_weighting_name(record->options.weighting), fit_method_name(record->options.method),
-                (unsigned long long)record->options.seed, record->result.elapsed_total_ms);
+        fprintf(stderr, "%s: %zu points%s, %s weights, %s, seed %llu, %.0f ms\n", data->source,
+                record->points, data->left_out ? " (others left out by the filter)" : "",
+                fit_weighting_name(record->options.weighting),
+                fit_method_name(record->options.method), (unsigned long long)record->options.seed,
+                record->result.elapsed_total_ms);
         fitview_print(o);
         json_decref(o);
     }
@@ -207,10 +219,16 @@ static int run_fit(const struct verb *verb, int argc, char **argv)
     return status;
 }
 
-const struct verb verb_fit = {
-    "fit", "DATA", "parameters with uncertainties, from a CSV or a campaign",
-    "DATA is a CSV with theta_i_deg, theta_r_signed_deg (or theta_r_deg and dphi_deg), f_r and optionally\n"
-    "u_f_r, pol_in, pol_out; or a campaign: a file, or the name or number that gonio list shows. Prints n, k,\n"
-    "sigma, ks, kd with standard uncertainty and 95 % interval, and what the data identify better than n, k\n"
-    "and ks alone: ks*R at normal incidence and at 45 deg, and the reflectance of the hemisphere.\n",
-    rows, run_fit};
+const struct verb verb_fit = {"fit",
+                              "DATA",
+                              "parameters with uncertainties, from a CSV or a campaign",
+                              "DATA is a CSV with theta_i_deg, theta_r_signed_deg (or theta_r_deg "
+                              "and dphi_deg), f_r and optionally\n"
+                              "u_f_r, pol_in, pol_out; or a campaign: a file, or the name or "
+                              "number that gonio list shows. Prints n, k,\n"
+                              "sigma, ks, kd with standard uncertainty and 95 % interval, and what "
+                              "the data identify better than n, k\n"
+                              "and ks alone: ks*R at normal incidence and at 45 deg, and the "
+                              "reflectance of the hemisphere.\n",
+                              rows,
+                              run_fit};

@@ -7,7 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static int choose(const char *option, const char *word, const char *const *words, struct gon_error *err)
+static int choose(const char *option, const char *word, const char *const *words,
+                  struct gon_error *err)
 {
     char all[200] = "";
     for (int i = 0; words[i]; i++) {
@@ -17,7 +18,8 @@ static int choose(const char *option, const char *word, const char *const *words
     }
     const char *meant = options_suggest(word, words);
     if (meant)
-        return gon_fail(err, GON_E_INPUT, "%s '%s': did you mean '%s'? allowed: %s", option, word, meant, all);
+        return gon_fail(err, GON_E_INPUT, "%s '%s': did you mean '%s'? allowed: %s", option, word,
+                        meant, all);
     return gon_fail(err, GON_E_INPUT, "%s '%s': allowed: %s", option, word, all);
 }
 
@@ -27,14 +29,17 @@ static int take_weights(const char *word, struct fit_options *o, struct gon_erro
     double g;
     if (!strncmp(word, "dense:", 6)) {
         if (options_real(word + 6, &g) < 0 || g <= 0)
-            return gon_fail(err, GON_E_INPUT, "--weights dense:G needs a number > 0 after the colon, not '%s'", word + 6);
+            return gon_fail(err, GON_E_INPUT,
+                            "--weights dense:G needs a number > 0 after the colon, not '%s'",
+                            word + 6);
         o->weighting = FIT_DENSE;
         o->dense_g = g;
         return GON_OK;
     }
     int i = choose("--weights", word, words, err);
     if (i == 1)
-        return gon_fail(err, GON_E_INPUT, "--weights dense:G needs a number in the place of G, for example dense:3");
+        return gon_fail(err, GON_E_INPUT,
+                        "--weights dense:G needs a number in the place of G, for example dense:3");
     if (i >= 0)
         o->weighting = (enum fit_weighting)i;
     return i < 0 ? i : GON_OK;
@@ -52,26 +57,31 @@ static int take_bound(char *text, struct fit_options *o, struct gon_error *err)
     char *equals = strchr(text, '='), *colon = equals ? strchr(equals, ':') : NULL;
     double low, high;
     if (!colon)
-        return gon_fail(err, GON_E_INPUT, "--bounds '%s' is not NAME=LOW:HIGH, for example n=1:3", text);
+        return gon_fail(err, GON_E_INPUT, "--bounds '%s' is not NAME=LOW:HIGH, for example n=1:3",
+                        text);
     *equals = *colon = 0;
     if (options_real(equals + 1, &low) < 0 || options_real(colon + 1, &high) < 0)
-        return gon_fail(err, GON_E_INPUT, "--bounds %s: '%s:%s' are not two numbers", text, equals + 1, colon + 1);
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: '%s:%s' are not two numbers", text,
+                        equals + 1, colon + 1);
     if (!(low < high))
-        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is empty; low must be below high", text, low, high);
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is empty; low must be below high",
+                        text, low, high);
     for (int p = 0; p < FIT_PARAMS; p++)
         if (!strcmp(text, fit_param_name((enum fit_param)p))) {
             *bound_of(&o->lower, p) = low;
             *bound_of(&o->upper, p) = high;
             return GON_OK;
         }
-    return gon_fail(err, GON_E_INPUT, "--bounds: no parameter '%s'; allowed: n, k, sigma, ks, kd", text);
+    return gon_fail(err, GON_E_INPUT, "--bounds: no parameter '%s'; allowed: n, k, sigma, ks, kd",
+                    text);
 }
 
 static int take_bounds(const char *text, struct fit_options *o, struct gon_error *err)
 {
     char copy[400];
     if (strlen(text) >= sizeof copy)
-        return gon_fail(err, GON_E_INPUT, "--bounds is longer than %zu characters", sizeof copy - 1);
+        return gon_fail(err, GON_E_INPUT, "--bounds is longer than %zu characters",
+                        sizeof copy - 1);
     strcpy(copy, text);
     for (char *part = copy, *end; part; part = end ? end + 1 : NULL) {
         end = strchr(part, ',');
@@ -84,9 +94,11 @@ static int take_bounds(const char *text, struct fit_options *o, struct gon_error
     return GON_OK;
 }
 
-int fit_words_take(const struct fit_words *words, struct fit_options *options, struct gon_error *err)
+int fit_words_take(const struct fit_words *words, struct fit_options *options,
+                   struct gon_error *err)
 {
-    static const char *const methods[] = {"memetic", "paper", NULL}, *const diffuses[] = {"paper", "lambert", NULL};
+    static const char *const methods[] = {"memetic", "paper", NULL}, *const diffuses[] = {
+                                                                         "paper", "lambert", NULL};
     struct fit_options o = *options;
     int rc = GON_OK;
     if (words->method && (rc = choose("--method", words->method, methods, err)) >= 0)
@@ -109,7 +121,8 @@ int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_erro
     double deg[FIT_MOST_ANGLES];
     int count = 0;
     if (strlen(text) >= sizeof copy)
-        return gon_fail(err, GON_E_INPUT, "--theta-i is longer than %zu characters", sizeof copy - 1);
+        return gon_fail(err, GON_E_INPUT, "--theta-i is longer than %zu characters",
+                        sizeof copy - 1);
     strcpy(copy, text);
     for (char *part = copy, *end; part; part = end ? end + 1 : NULL) {
         end = strchr(part, ',');
@@ -118,7 +131,9 @@ int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_erro
         if (count == most || count == FIT_MOST_ANGLES)
             return gon_fail(err, GON_E_INPUT, "--theta-i: at most %d angles", most);
         if (options_real(part, &deg[count]) < 0 || deg[count] < 0 || deg[count] >= 90)
-            return gon_fail(err, GON_E_INPUT, "--theta-i '%s' is not an angle of 0..90 deg; give a list: 0,10,20", part);
+            return gon_fail(err, GON_E_INPUT,
+                            "--theta-i '%s' is not an angle of 0..90 deg; give a list: 0,10,20",
+                            part);
         count++;
     }
     memcpy(ret_deg, deg, (size_t)count * sizeof *deg);

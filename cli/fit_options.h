@@ -14,7 +14,8 @@ struct fit_words { // NULL: not given
 };
 
 // Changes what the words name in options and leaves the rest. GON_E_INPUT says which word is wrong.
-int fit_words_take(const struct fit_words *words, struct fit_options *options, struct gon_error *err);
+int fit_words_take(const struct fit_words *words, struct fit_options *options,
+                   struct gon_error *err);
 
 // "0,10,20.5" into degrees: the count.
 int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_error *err);

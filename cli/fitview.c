@@ -41,7 +41,8 @@ static void parameter(struct table *t, const json_t *params, const char *name)
                at_bound && !identified ? ", not identified" : "");
 }
 
-static void derived(struct table *t, const json_t *all, const char *key, const char *name, const char *note)
+static void derived(struct table *t, const json_t *all, const char *key, const char *name,
+                    const char *note)
 {
     const json_t *d = json_object_get(all, key);
     double u = number(d, "u");
@@ -66,7 +67,9 @@ void fitview_print(const json_t *fit)
     static const char *const names[] = {"n", "k", "sigma", "ks", "kd"};
     const json_t *params = json_object_get(fit, "params"), *more = json_object_get(fit, "derived");
     struct table *t = table_new(6);
-    for (const char *const *h = (const char *const[]){"parameter", "value", "u", "lo95", "hi95", "note", NULL}; *h; h++)
+    for (const char *const *h =
+             (const char *const[]){"parameter", "value", "u", "lo95", "hi95", "note", NULL};
+         *h; h++)
         table_cell(t, "%s", *h);
     for (int i = 1; i < 5; i++)
         table_right(t, i);
@@ -102,5 +105,6 @@ void fitview_line(const json_t *fit, char *text, unsigned long size)
     quantity(params, "sigma", sigma, sizeof sigma);
     quantity(params, "kd", kd, sizeof kd);
     quantity(json_object_get(fit, "derived"), "ks_r0", r0, sizeof r0);
-    snprintf(text, size, "sigma %s, kd %s, ks*R(0) %s, Delta %.3g", sigma, kd, r0, number(fit, "delta"));
+    snprintf(text, size, "sigma %s, kd %s, ks*R(0) %s, Delta %.3g", sigma, kd, r0,
+             number(fit, "delta"));
 }

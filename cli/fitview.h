@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A fit for people: parameters with uncertainties and intervals, what is identified and what is not, and
-// the quantities that the data do determine.
+// A fit for people: parameters with uncertainties and intervals, what is identified and what is
+// not, and the quantities that the data do determine.
 #pragma once
 
 struct json_t; // of jansson

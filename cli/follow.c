@@ -56,7 +56,8 @@ static void time_left(double left_s, char *text, size_t size)
     else if (left_s < 6000)
         snprintf(text, size, "%.0f min left", left_s / 60);
     else
-        snprintf(text, size, "%.0f h %02.0f min left", floor(left_s / 3600), floor(fmod(left_s, 3600) / 60));
+        snprintf(text, size, "%.0f h %02.0f min left", floor(left_s / 3600),
+                 floor(fmod(left_s, 3600) / 60));
 }
 
 static void where(const json_t *e, char *text, size_t size)
@@ -93,8 +94,8 @@ static void show_reading(struct follow *f, const json_t *e)
     time_left(number(e, "left_s"), left, sizeof left);
     if (isfinite(number(e, "f_r_per_sr")))
         out_value(value, sizeof value, number(e, "f_r_per_sr"), number(e, "u_f_r_per_sr"));
-    snprintf(rest, sizeof rest, "%3.0f%%  θr %6.2f°  %s%s%s  %s  laser %s", 100 * part, number(e, "theta_r_deg"),
-             *value ? "f_r " : "", value, *value ? " /sr" : "", left,
+    snprintf(rest, sizeof rest, "%3.0f%%  θr %6.2f°  %s%s%s  %s  laser %s", 100 * part,
+             number(e, "theta_r_deg"), *value ? "f_r " : "", value, *value ? " /sr" : "", left,
              json_is_true(json_object_get(e, "emission")) ? "ON" : "off");
     bar(part, out_columns(stderr) - width(sweep) - width(rest) - 4, filled);
     fprintf(stderr, "\r%s  %s %s\033[K", sweep, filled, rest);
@@ -109,7 +110,8 @@ static void show_sweep(struct follow *f, const json_t *e)
     time_left(number(e, "left_s"), left, sizeof left);
     if (!f->live)
         fprintf(stderr, "sweep %d/%d  theta_i %g deg  %d of %d readings  %s\n", whole(e, "sweep"),
-                whole(e, "sweeps"), number(e, "theta_i_deg"), whole(e, "done"), whole(e, "total"), left);
+                whole(e, "sweeps"), number(e, "theta_i_deg"), whole(e, "done"), whole(e, "total"),
+                left);
 }
 
 static void show_state(struct follow *f, const json_t *e)
@@ -220,7 +222,8 @@ int follow_run(struct client *c, int run, const char *file, const char *last_id,
     int rc = client_follow(c, last_id, fd, &follower, &err), status;
     clear_line(&f);
     if (rc == GON_E_CANCELED) {
-        out_say("stopped watching; run %d goes on. Stop it: gonio stop. Watch it: gonio watch", run);
+        out_say("stopped watching; run %d goes on. Stop it: gonio stop. Watch it: gonio watch",
+                run);
         status = EXIT_INTERRUPTED;
     } else if (rc < 0) {
         status = out_fail(&err);

@@ -14,7 +14,8 @@ struct options {
 };
 
 static const struct option_row rows[] = {
-    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0, "the folder of campaigns ($GONIO_DIR)"},
+    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
+     "the folder of campaigns ($GONIO_DIR)"},
     {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
     VERB_OPTIONS_END,
 };
@@ -44,9 +45,10 @@ static void print_json(const struct catalog_entry *e, int count)
 {
     json_t *all = json_array();
     for (int i = 0; i < count; i++, e++) {
-        json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i}", "id", e->id, "name", e->name,
-                              "sample", e->sample, "state", e->state, "problem", e->problem, "file", e->path,
-                              "done", e->done, "total", e->total, "writer_pid", e->writer_pid);
+        json_t *o =
+            json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i}", "id", e->id, "name", e->name,
+                      "sample", e->sample, "state", e->state, "problem", e->problem, "file",
+                      e->path, "done", e->done, "total", e->total, "writer_pid", e->writer_pid);
         json_object_set_new(o, "created_utc", utc(e->created_utc_ms));
         json_object_set_new(o, "started_utc", utc(e->started_utc_ms));
         json_object_set_new(o, "finished_utc", utc(e->finished_utc_ms));
@@ -58,7 +60,8 @@ static void print_json(const struct catalog_entry *e, int count)
 
 static void print_table(const struct catalog_entry *e, int count)
 {
-    static const char *const head[] = {"run", "state", "readings", "name", "sample", "created", "finished"};
+    static const char *const head[] = {"run",    "state",   "readings", "name",
+                                       "sample", "created", "finished"};
     struct table *t = table_new(7);
     for (int i = 0; i < 7; i++)
         table_cell(t, "%s", head[i]);
@@ -106,7 +109,10 @@ static int run_list(const struct verb *verb, int argc, char **argv)
     return EXIT_OK;
 }
 
-const struct verb verb_list = {
-    "list", "", "campaigns with their numbers and states",
-    "Lists the campaign files of a folder, oldest first. The number stands for the file in every verb.\n", rows,
-    run_list};
+const struct verb verb_list = {"list",
+                               "",
+                               "campaigns with their numbers and states",
+                               "Lists the campaign files of a folder, oldest first. The number "
+                               "stands for the file in every verb.\n",
+                               rows,
+                               run_list};

@@ -19,9 +19,11 @@ static void print_verbs(FILE *out)
     fprintf(out, "usage: gonio VERB [OPTIONS] [FILE]\n\n");
     for (int i = 0; i < VERBS; i++)
         fprintf(out, "  %-8s %s\n", verbs[i]->name, verbs[i]->summary);
-    fprintf(out, "\ngonio help VERB tells more; gonio --version; the daemon: goniod --help\n"
-                 "Exit status: 0 done, 1 the instrument or the fit failed, 2 wrong arguments or file, 3 no\n"
-                 "daemon, 4 refused, 130 interrupted.\n");
+    fprintf(
+        out,
+        "\ngonio help VERB tells more; gonio --version; the daemon: goniod --help\n"
+        "Exit status: 0 done, 1 the instrument or the fit failed, 2 wrong arguments or file, 3 no\n"
+        "daemon, 4 refused, 130 interrupted.\n");
 }
 
 static void print_verb(const struct verb *v, FILE *out)

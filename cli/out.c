@@ -31,7 +31,8 @@ int out_columns(FILE *out)
 
 const char *out_begin(FILE *out, enum out_style style)
 {
-    static const char *const codes[] = {"", "\033[1m", "\033[2m", "\033[31m", "\033[32m", "\033[33m"};
+    static const char *const codes[] = {"",         "\033[1m",  "\033[2m",
+                                        "\033[31m", "\033[32m", "\033[33m"};
     return out_colour(out) ? codes[style] : "";
 }
 
@@ -40,8 +41,8 @@ const char *out_end(FILE *out)
     return out_colour(out) ? "\033[0m" : "";
 }
 
-__attribute__((format(printf, 3, 0))) static void say(const char *begin, enum out_style style, const char *fmt,
-                                                      va_list ap)
+__attribute__((format(printf, 3, 0))) static void say(const char *begin, enum out_style style,
+                                                      const char *fmt, va_list ap)
 {
     char text[2000];
     vsnprintf(text, sizeof text, fmt, ap);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How the command speaks: data on stdout, talk on stderr; colour and live lines only on a terminal and
-// not with NO_COLOR; tables aligned on a terminal and tab-separated in a pipe.
+// How the command speaks: data on stdout, talk on stderr; colour and live lines only on a terminal
+// and not with NO_COLOR; tables aligned on a terminal and tab-separated in a pipe.
 #pragma once
 #include "base/err.h"
 
@@ -19,7 +19,8 @@ const char *out_begin(FILE *out, enum out_style style); // "" without colour
 const char *out_end(FILE *out);
 
 void out_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));  // "gonio: ..." on stderr
-void out_warn(const char *fmt, ...) __attribute__((format(printf, 1, 2))); // "warning: ..." on stderr
+void out_warn(const char *fmt, ...)
+    __attribute__((format(printf, 1, 2))); // "warning: ..." on stderr
 
 // "0.0317 ±0.0006": as many decimals as the first digit of u needs; without u, four digits.
 void out_value(char *text, size_t size, double value, double u);
@@ -38,4 +39,4 @@ struct table;
 struct table *table_new(int columns); // never NULL: ends the program without memory
 void table_cell(struct table *t, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 void table_right(struct table *t, int column);       // aligned to the right
-void table_print(struct table *t, FILE *out);        // the first row is the heading; frees the table
+void table_print(struct table *t, FILE *out); // the first row is the heading; frees the table

@@ -19,7 +19,8 @@ struct options {
 static const struct option_row rows[] = {
     {"--bench", OPTION_TEXT, offsetof(struct options, bench), "FILE", 0, 0,
      "the bench (goniod.cfg): limits, and the time it takes"},
-    {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON, with every point"},
+    {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0,
+     "print JSON, with every point"},
     VERB_OPTIONS_END,
 };
 
@@ -43,7 +44,8 @@ static void duration_text(double s, char *text, size_t size)
 
 static struct sweep sweep_of(const struct plan *p, const struct campaign_config *c, int sweep)
 {
-    struct sweep s = {.theta_i_deg = sweep <= c->theta_i_count ? c->theta_i_deg[sweep - 1] : (double)NAN};
+    struct sweep s = {.theta_i_deg =
+                          sweep <= c->theta_i_count ? c->theta_i_deg[sweep - 1] : (double)NAN};
     for (int i = 0; i < p->count; i++)
         if (p->points[i].sweep == sweep) {
             s.theta_i_deg = p->points[i].theta_i_deg;
@@ -63,11 +65,15 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
     char time[60], dense[40];
     duration_text(p->duration_s, time, sizeof time);
     snprintf(dense, sizeof dense, "dense (±%g°)", c->dense_half_width_deg);
-    fprintf(stderr, "%s: %d sweeps, %d points on the sample and %d reference readings, %d samples a point, %s\n",
+    fprintf(stderr,
+            "%s: %d sweeps, %d points on the sample and %d reference readings, %d samples a point, "
+            "%s\n",
             c->name, p->sweeps, p->samples, p->count - p->samples, c->readings, time);
     struct table *t = table_new(6);
     bool terminal = out_is_terminal(stdout);
-    const char *head[] = {"sweep", terminal ? "θi" : "theta_i_deg", "points", terminal ? dense : "dense", "skipped", "why"};
+    const char *head[] = {"sweep",   terminal ? "θi" : "theta_i_deg",
+                          "points",  terminal ? dense : "dense",
+                          "skipped", "why"};
     for (int i = 0; i < 6; i++) {
         table_cell(t, "%s", head[i]);
         if (i < 5)
@@ -95,10 +101,11 @@ static json_t *points_json(const struct plan *p)
     json_t *all = json_array();
     for (int i = 0; i < p->count; i++) {
         const struct plan_point *q = &p->points[i];
-        json_array_append_new(all, json_pack("{s:i, s:i, s:s, s:s, s:f, s:f, s:f, s:b}", "sweep", q->sweep, "point",
-                                             q->point, "kind", plan_kind_name(q->kind), "station", q->station,
-                                             "theta_i_deg", q->theta_i_deg, "theta_r_deg", q->theta_r_deg,
-                                             "weight", q->weight, "dense", q->dense));
+        json_array_append_new(
+            all, json_pack("{s:i, s:i, s:s, s:s, s:f, s:f, s:f, s:b}", "sweep", q->sweep, "point",
+                           q->point, "kind", plan_kind_name(q->kind), "station", q->station,
+                           "theta_i_deg", q->theta_i_deg, "theta_r_deg", q->theta_r_deg, "weight",
+                           q->weight, "dense", q->dense));
     }
     return all;
 }
@@ -108,9 +115,9 @@ static json_t *skips_json(const struct plan *p)
     json_t *all = json_array();
     for (int i = 0; i < p->skips_count; i++) {
         const struct plan_skip *k = &p->skips[i];
-        json_array_append_new(all, json_pack("{s:i, s:f, s:f, s:s}", "sweep", k->sweep, "theta_i_deg",
-                                             k->theta_i_deg, "theta_r_deg", k->theta_r_deg, "reason",
-                                             plan_skip_text(k->reason)));
+        json_array_append_new(all, json_pack("{s:i, s:f, s:f, s:s}", "sweep", k->sweep,
+                                             "theta_i_deg", k->theta_i_deg, "theta_r_deg",
+                                             k->theta_r_deg, "reason", plan_skip_text(k->reason)));
     }
     return all;
 }
@@ -120,8 +127,9 @@ static json_t *sweeps_json(const struct plan *p, const struct campaign_config *c
     json_t *all = json_array();
     for (int i = 1; i <= p->sweeps; i++) {
         struct sweep s = sweep_of(p, c, i);
-        json_array_append_new(all, json_pack("{s:i, s:f, s:i, s:i, s:i}", "sweep", i, "theta_i_deg", s.theta_i_deg,
-                                             "points", s.points, "dense", s.dense, "skipped", s.skipped));
+        json_array_append_new(all, json_pack("{s:i, s:f, s:i, s:i, s:i}", "sweep", i, "theta_i_deg",
+                                             s.theta_i_deg, "points", s.points, "dense", s.dense,
+                                             "skipped", s.skipped));
     }
     return all;
 }
@@ -131,10 +139,11 @@ static void print_json(const struct plan *p, const struct campaign_config *c)
     json_t *warnings = json_array();
     for (int i = 0; i < p->warnings_count; i++)
         json_array_append_new(warnings, json_string(p->warnings[i]));
-    json_t *o = json_pack("{s:s, s:s, s:i, s:i, s:i, s:i}", "name", c->name, "sample", c->sample, "sweep_count",
-                          p->sweeps, "points", p->count, "sample_points", p->samples, "samples_per_point",
-                          c->readings);
-    json_object_set_new(o, "duration_s", isfinite(p->duration_s) ? json_real(p->duration_s) : json_null());
+    json_t *o = json_pack("{s:s, s:s, s:i, s:i, s:i, s:i}", "name", c->name, "sample", c->sample,
+                          "sweep_count", p->sweeps, "points", p->count, "sample_points", p->samples,
+                          "samples_per_point", c->readings);
+    json_object_set_new(o, "duration_s",
+                        isfinite(p->duration_s) ? json_real(p->duration_s) : json_null());
     json_object_set_new(o, "sweeps", sweeps_json(p, c));
     json_object_set_new(o, "order", points_json(p));
     json_object_set_new(o, "skipped", skips_json(p));
@@ -168,8 +177,11 @@ static int run_plan(const struct verb *verb, int argc, char **argv)
     return EXIT_OK;
 }
 
-const struct verb verb_plan = {
-    "plan", "CAMPAIGN.cfg", "the dry run: points, order, time, warnings; moves nothing",
-    "Prints every sweep with its points, what is skipped and why, warnings, and with --bench the time it\n"
-    "takes and the points beyond the axes' limits.\n",
-    rows, run_plan};
+const struct verb verb_plan = {"plan",
+                               "CAMPAIGN.cfg",
+                               "the dry run: points, order, time, warnings; moves nothing",
+                               "Prints every sweep with its points, what is skipped and why, "
+                               "warnings, and with --bench the time it\n"
+                               "takes and the points beyond the axes' limits.\n",
+                               rows,
+                               run_plan};

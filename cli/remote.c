@@ -21,8 +21,8 @@ static const struct option_row rows[] = {
     VERB_OPTIONS_END,
 };
 
-json_t *remote_call(const struct remote_options *o, const char *method, const char *path, const json_t *body,
-                    int *ret_status)
+json_t *remote_call(const struct remote_options *o, const char *method, const char *path,
+                    const json_t *body, int *ret_status)
 {
     struct client *c = NULL;
     struct gon_error err;
@@ -47,7 +47,8 @@ static int whole(const json_t *o, const char *key)
     return (int)json_integer_value(json_object_get(o, key));
 }
 
-static void put_number(const json_t *o, const char *key, const char *fmt_before, int decimals, const char *unit)
+static void put_number(const json_t *o, const char *key, const char *fmt_before, int decimals,
+                       const char *unit)
 {
     const json_t *v = json_object_get(o, key);
     if (json_is_number(v))
@@ -70,9 +71,11 @@ static void print_axis(const json_t *d)
 
 static void print_laser(const json_t *d)
 {
-    printf("%s, emission %s", text_of(d, "state"), json_is_true(json_object_get(d, "emission")) ? "ON" : "off");
+    printf("%s, emission %s", text_of(d, "state"),
+           json_is_true(json_object_get(d, "emission")) ? "ON" : "off");
     put_number(d, "power_w", ", ", 4, "W");
-    printf(", interlock %s", json_is_true(json_object_get(d, "interlock_closed")) ? "closed" : "OPEN");
+    printf(", interlock %s",
+           json_is_true(json_object_get(d, "interlock_closed")) ? "closed" : "OPEN");
     if (json_is_true(json_object_get(d, "off_unconfirmed")))
         printf(", LASER MAY BE ON: use the key or the interlock");
 }
@@ -109,7 +112,8 @@ static void print_device(const json_t *d)
 static void print_run(const json_t *r)
 {
     const char *text = text_of(r, "text");
-    printf("run %d    %s (%s)%s%s\n", whole(r, "run"), text_of(r, "state"), text_of(r, "name"), *text ? ": " : "", text);
+    printf("run %d    %s (%s)%s%s\n", whole(r, "run"), text_of(r, "state"), text_of(r, "name"),
+           *text ? ": " : "", text);
     printf("progress  sweep %d of %d, %d of %d readings", whole(r, "sweep"), whole(r, "sweeps"),
            whole(r, "done"), whole(r, "total"));
     put_number(r, "left_s", ", ", 0, "s left");
@@ -127,7 +131,8 @@ static void print_status(const json_t *s)
     const json_t *run = json_object_get(s, "run"), *each;
     size_t i;
     printf("goniod %s, pid %d%s, campaigns in %s\n", text_of(s, "version"), whole(s, "pid"),
-           json_is_true(json_object_get(s, "simulator")) ? ", simulated bench" : "", text_of(s, "directory"));
+           json_is_true(json_object_get(s, "simulator")) ? ", simulated bench" : "",
+           text_of(s, "directory"));
     if (json_is_object(run))
         print_run(run);
     else
@@ -156,12 +161,18 @@ static int run_status(const struct verb *verb, int argc, char **argv)
 }
 
 const struct verb verb_status = {
-    "status", "", "what the daemon is doing: run, axes, laser, detector",
-    "Shows the run that has the bench, what waits, each device, and the last error.\n", rows, run_status};
+    "status",
+    "",
+    "what the daemon is doing: run, axes, laser, detector",
+    "Shows the run that has the bench, what waits, each device, and the last error.\n",
+    rows,
+    run_status};
 
-// --- stop, pause, resume --------------------------------------------------------------------------
+// --- stop, pause, resume
+// --------------------------------------------------------------------------
 
-static int command(const struct verb *verb, int argc, char **argv, const char *path, json_t **ret_reply)
+static int command(const struct verb *verb, int argc, char **argv, const char *path,
+                   json_t **ret_reply)
 {
     struct options o = {0};
     int status = EXIT_OK;
@@ -182,31 +193,43 @@ static int run_stop(const struct verb *verb, int argc, char **argv)
         fprintf(stderr, "run %d %s%s. Go on with: gonio resume %d\n", run, text_of(reply, "state"),
                 off ? ": laser off, axes halted" : "", run);
     else if (reply)
-        fprintf(stderr, "nothing was running%s\n", off ? "; laser off and axes halted all the same" : "");
+        fprintf(stderr, "nothing was running%s\n",
+                off ? "; laser off and axes halted all the same" : "");
     if (reply && !off) {
-        out_say("the laser does not confirm that it is off: use its key or the interlock; see: gonio status");
+        out_say("the laser does not confirm that it is off: use its key or the interlock; see: "
+                "gonio status");
         status = EXIT_FAILED;
     }
     json_decref(reply);
     return status;
 }
 
-const struct verb verb_stop = {
-    "stop", "", "laser off and axes halted, at once and without asking",
-    "Ends the run that has the bench and puts back those that wait. All readings are kept; go on later\n"
-    "with gonio resume. Works in any state, and asks nothing.\n", rows, run_stop};
+const struct verb verb_stop = {"stop",
+                               "",
+                               "laser off and axes halted, at once and without asking",
+                               "Ends the run that has the bench and puts back those that wait. All "
+                               "readings are kept; go on later\n"
+                               "with gonio resume. Works in any state, and asks nothing.\n",
+                               rows,
+                               run_stop};
 
 static int run_pause(const struct verb *verb, int argc, char **argv)
 {
     json_t *reply = NULL;
     int status = command(verb, argc, argv, "/api/v1/pause", &reply);
     if (reply)
-        fprintf(stderr, "run %d pauses after the reading in progress, laser off. Go on with: gonio resume\n",
-                whole(reply, "run"));
+        fprintf(
+            stderr,
+            "run %d pauses after the reading in progress, laser off. Go on with: gonio resume\n",
+            whole(reply, "run"));
     json_decref(reply);
     return status;
 }
 
 const struct verb verb_pause = {
-    "pause", "", "hold the run, laser off, until gonio resume",
-    "Holds the run that has the bench after the reading in progress: laser off, axes still.\n", rows, run_pause};
+    "pause",
+    "",
+    "hold the run, laser off, until gonio resume",
+    "Holds the run that has the bench after the reading in progress: laser off, axes still.\n",
+    rows,
+    run_pause};

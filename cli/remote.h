@@ -14,7 +14,8 @@ struct remote_options {
 
 #define REMOTE_SOCKET(type) \
     {"--socket", OPTION_TEXT, offsetof(type, remote.socket), "PATH", 0, 0, "the daemon's socket"}
-#define REMOTE_JSON(type) {"--json", OPTION_FLAG, offsetof(type, remote.json), NULL, 0, 0, "print JSON"}
+#define REMOTE_JSON(type) \
+    {"--json", OPTION_FLAG, offsetof(type, remote.json), NULL, 0, 0, "print JSON"}
 
 // One request: the reply, or the exit status in *ret_status and NULL after saying what went wrong.
 struct json_t *remote_call(const struct remote_options *o, const char *method, const char *path,

@@ -18,15 +18,18 @@ struct options {
 };
 
 static const struct option_row run_rows[] = {
-    {"--detach", OPTION_FLAG, offsetof(struct options, detach), NULL, 0, 0, "start it and do not follow"},
+    {"--detach", OPTION_FLAG, offsetof(struct options, detach), NULL, 0, 0,
+     "start it and do not follow"},
     REMOTE_SOCKET(struct options),
-    {"--json", OPTION_FLAG, offsetof(struct options, remote.json), NULL, 0, 0, "one JSON object a line"},
+    {"--json", OPTION_FLAG, offsetof(struct options, remote.json), NULL, 0, 0,
+     "one JSON object a line"},
     VERB_OPTIONS_END,
 };
 
 static const struct option_row watch_rows[] = {
     REMOTE_SOCKET(struct options),
-    {"--json", OPTION_FLAG, offsetof(struct options, remote.json), NULL, 0, 0, "one JSON object a line"},
+    {"--json", OPTION_FLAG, offsetof(struct options, remote.json), NULL, 0, 0,
+     "one JSON object a line"},
     VERB_OPTIONS_END,
 };
 
@@ -40,7 +43,8 @@ static int follow(const struct remote_options *o, const json_t *run, const json_
     snprintf(id, sizeof id, "%" JSON_INTEGER_FORMAT, json_integer_value(event_id));
     if (client_new(o->socket, &c, &err) < 0)
         return out_fail(&err);
-    int status = follow_run(c, (int)json_integer_value(json_object_get(run, "run")), file ? file : "", id, o->json);
+    int status = follow_run(c, (int)json_integer_value(json_object_get(run, "run")),
+                            file ? file : "", id, o->json);
     client_free(c);
     return status;
 }
@@ -52,8 +56,8 @@ static int begun(const struct options *o, json_t *reply, const char *what)
     if (o->remote.json && o->detach)
         out_json_line(reply);
     else if (!o->remote.json)
-        fprintf(stderr, "run %d %s%s\n", (int)json_integer_value(json_object_get(reply, "run")), what,
-                o->detach ? ". Watch it: gonio watch" : "");
+        fprintf(stderr, "run %d %s%s\n", (int)json_integer_value(json_object_get(reply, "run")),
+                what, o->detach ? ". Watch it: gonio watch" : "");
     if (!o->detach)
         status = follow(&o->remote, reply, json_object_get(reply, "event_id"));
     json_decref(reply);
@@ -79,10 +83,14 @@ static int run_run(const struct verb *verb, int argc, char **argv)
 }
 
 const struct verb verb_run = {
-    "run", "FILE.cfg", "measure a campaign and follow it to its end",
-    "Gives the campaign to the daemon, shows its progress, and at the end the fitted parameters. Ctrl-C\n"
+    "run",
+    "FILE.cfg",
+    "measure a campaign and follow it to its end",
+    "Gives the campaign to the daemon, shows its progress, and at the end the fitted parameters. "
+    "Ctrl-C\n"
     "stops watching only; the run goes on until gonio stop. Look first with: gonio plan FILE.cfg\n",
-    run_rows, run_run};
+    run_rows,
+    run_run};
 
 static int run_watch(const struct verb *verb, int argc, char **argv)
 {
@@ -109,7 +117,8 @@ const struct verb verb_watch = {
     "Shows the progress of the active run until its end. Ctrl-C stops watching; the run goes on.\n",
     watch_rows, run_watch};
 
-// --- resume ---------------------------------------------------------------------------------------
+// --- resume
+// ---------------------------------------------------------------------------------------
 
 // The run's number when the text is one, else the file's path as the daemon will need it.
 static json_t *what_to_resume(const char *text)
@@ -129,14 +138,19 @@ static int run_resume(const struct verb *verb, int argc, char **argv)
     if (count < 0)
         return EXIT_INPUT;
     json_t *body = count ? what_to_resume(operand) : NULL;
-    json_t *reply = remote_call(&o.remote, "POST", count ? "/api/v1/runs" : "/api/v1/resume", body, &status);
+    json_t *reply =
+        remote_call(&o.remote, "POST", count ? "/api/v1/runs" : "/api/v1/resume", body, &status);
     json_decref(body);
     return reply ? begun(&o, reply, "goes on") : status;
 }
 
-const struct verb verb_resume = {
-    "resume", "[RUN]", "go on with a paused run, or with RUN where it was stopped",
-    "Without RUN, goes on with the run that is paused. RUN is a number that gonio list shows, or a campaign\n"
-    "file: it is queued again and goes on with its first point that has no accepted reading. Follows it as\n"
-    "gonio run does.\n",
-    run_rows, run_resume};
+const struct verb verb_resume = {"resume",
+                                 "[RUN]",
+                                 "go on with a paused run, or with RUN where it was stopped",
+                                 "Without RUN, goes on with the run that is paused. RUN is a "
+                                 "number that gonio list shows, or a campaign\n"
+                                 "file: it is queued again and goes on with its first point that "
+                                 "has no accepted reading. Follows it as\n"
+                                 "gonio run does.\n",
+                                 run_rows,
+                                 run_resume};

@@ -22,7 +22,8 @@ struct options {
 static const struct option_row rows[] = {
     {"--sweep", OPTION_INT, offsetof(struct options, sweep), "N", 0, 1000,
      "the readings of sweep N; 0 and the last are the references"},
-    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0, "the folder of campaigns ($GONIO_DIR)"},
+    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
+     "the folder of campaigns ($GONIO_DIR)"},
     {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
     VERB_OPTIONS_END,
 };
@@ -37,7 +38,8 @@ struct campaign {
     char no_reduction[480];
 };
 
-static int campaign_open(struct campaign *c, const char *dir, const char *file, struct gon_error *err)
+static int campaign_open(struct campaign *c, const char *dir, const char *file,
+                         struct gon_error *err)
 {
     char directory[CATALOG_PATH], path[CATALOG_PATH];
     struct gon_error why;
@@ -67,7 +69,8 @@ static json_t *number(double v)
     return isfinite(v) ? json_real(v) : json_null();
 }
 
-// --- one sweep ------------------------------------------------------------------------------------
+// --- one sweep
+// ------------------------------------------------------------------------------------
 
 static const struct reduced_point *reduced(const struct campaign *c, const struct store_reading *r)
 {
@@ -97,8 +100,9 @@ static void value_cell(struct table *t, double v)
 
 static void print_readings(const struct campaign *c, const struct store_reading *r, int count)
 {
-    static const char *const head[] = {"kind", "theta_i_deg", "theta_r_deg", "f_r_per_sr", "u_a_per_sr", "u_b_per_sr",
-                                       "signal_v", "monitor_v", "count", "attempt", "flags"};
+    static const char *const head[] = {"kind",       "theta_i_deg", "theta_r_deg", "f_r_per_sr",
+                                       "u_a_per_sr", "u_b_per_sr",  "signal_v",    "monitor_v",
+                                       "count",      "attempt",     "flags"};
     struct table *t = table_new(11);
     for (int i = 0; i < 11; i++) {
         table_cell(t, "%s", head[i]);
@@ -129,12 +133,12 @@ static json_t *reading_json(const struct campaign *c, const struct store_reading
     char flags[200];
     const struct reduced_point *p = reduced(c, r);
     store_flags_text(r->flags, flags, sizeof flags);
-    json_t *o = json_pack("{s:i, s:i, s:i, s:s, s:I, s:f, s:f, s:f, s:f, s:i, s:i, s:s, s:b}", "sweep", r->sweep, "point",
-                          r->point, "attempt", r->attempt, "kind", kind_of(c, r), "t_utc_ms",
-                          (json_int_t)r->t_utc_ms, "theta_i_deg", r->theta_i_udeg / 1e6, "theta_r_deg",
-                          r->theta_r_udeg / 1e6, "signal_v", r->signal_v, "signal_sd_v", r->signal_sd_v, "count",
-                          r->count, "range", r->range, "flags", flags, "accepted",
-                          (r->flags & STORE_REJECTING) == 0);
+    json_t *o = json_pack("{s:i, s:i, s:i, s:s, s:I, s:f, s:f, s:f, s:f, s:i, s:i, s:s, s:b}",
+                          "sweep", r->sweep, "point", r->point, "attempt", r->attempt, "kind",
+                          kind_of(c, r), "t_utc_ms", (json_int_t)r->t_utc_ms, "theta_i_deg",
+                          r->theta_i_udeg / 1e6, "theta_r_deg", r->theta_r_udeg / 1e6, "signal_v",
+                          r->signal_v, "signal_sd_v", r->signal_sd_v, "count", r->count, "range",
+                          r->range, "flags", flags, "accepted", (r->flags & STORE_REJECTING) == 0);
     json_object_set_new(o, "monitor_v", number(r->monitor_v));
     json_object_set_new(o, "monitor_sd_v", number(r->monitor_sd_v));
     json_object_set_new(o, "f_r_per_sr", number(p ? p->f_per_sr : (double)NAN));
@@ -159,7 +163,8 @@ static int show_sweep(struct campaign *c, const struct options *o)
         json_t *all = json_array();
         for (int i = 0; i < count; i++)
             json_array_append_new(all, reading_json(c, &r[i]));
-        json_t *object = json_pack("{s:i, s:i, s:o}", "run", c->entry.id, "sweep", (int)o->sweep, "readings", all);
+        json_t *object = json_pack("{s:i, s:i, s:o}", "run", c->entry.id, "sweep", (int)o->sweep,
+                                   "readings", all);
         out_json(object);
         json_decref(object);
     } else {
@@ -169,7 +174,8 @@ static int show_sweep(struct campaign *c, const struct options *o)
     return EXIT_OK;
 }
 
-// --- the whole campaign ---------------------------------------------------------------------------
+// --- the whole campaign
+// ---------------------------------------------------------------------------
 
 struct events {
     json_t *list;
@@ -178,8 +184,9 @@ struct events {
 static bool take_event(void *ctx, const struct store_event *e)
 {
     struct events *all = ctx;
-    json_array_append_new(all->list, json_pack("{s:I, s:s, s:s, s:s}", "t_utc_ms", (json_int_t)e->t_utc_ms,
-                                               "level", e->level, "source", e->source, "text", e->text));
+    json_array_append_new(all->list,
+                          json_pack("{s:I, s:s, s:s, s:s}", "t_utc_ms", (json_int_t)e->t_utc_ms,
+                                    "level", e->level, "source", e->source, "text", e->text));
     if (json_array_size(all->list) > EVENTS_SHOWN)
         json_array_remove(all->list, 0); // the newest stay
     return true;
@@ -190,7 +197,8 @@ static json_t *reduction_json(const struct campaign *c)
     const struct reduction *r = &c->reduction;
     if (!c->reduced)
         return json_null();
-    json_t *o = json_pack("{s:i, s:i, s:f}", "points", r->count, "left_out", r->left_out, "omega_sr", r->omega_sr);
+    json_t *o = json_pack("{s:i, s:i, s:f}", "points", r->count, "left_out", r->left_out,
+                          "omega_sr", r->omega_sr);
     json_object_set_new(o, "u_scale_rel", number(r->u_scale_rel));
     json_object_set_new(o, "noise_floor_v", number(r->noise.floor_v));
     json_object_set_new(o, "noise_rel", number(r->noise.rel));
@@ -205,11 +213,11 @@ static json_t *describe(struct campaign *c)
     json_t *fit = text ? json_loads(text, 0, NULL) : NULL;
     free(text);
     store_each_event(c->store, 0, take_event, &events, NULL);
-    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:I, s:i, s:i}", "run", e->id, "file", e->path,
-                          "name", e->name, "sample", e->sample, "state", e->state, "problem", e->problem, "done",
-                          c->progress.done, "total", c->progress.total, "readings",
-                          (json_int_t)c->progress.readings, "sweeps_done", c->progress.sweeps_done, "sweeps",
-                          c->progress.sweeps);
+    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:I, s:i, s:i}", "run", e->id,
+                          "file", e->path, "name", e->name, "sample", e->sample, "state", e->state,
+                          "problem", e->problem, "done", c->progress.done, "total",
+                          c->progress.total, "readings", (json_int_t)c->progress.readings,
+                          "sweeps_done", c->progress.sweeps_done, "sweeps", c->progress.sweeps);
     json_object_set_new(o, "reduction", reduction_json(c));
     json_object_set_new(o, "events", events.list);
     json_object_set_new(o, "fit", fit ? fit : json_null());
@@ -222,10 +230,12 @@ static void print_description(const struct campaign *c, const json_t *o)
     const json_t *each;
     size_t i;
     printf("run %d    %s%s%s\n", e->id, e->state, *e->problem ? ": " : "", e->problem);
-    printf("name      %s%s%s%s\n", e->name, *e->sample ? "   (" : "", e->sample, *e->sample ? ")" : "");
+    printf("name      %s%s%s%s\n", e->name, *e->sample ? "   (" : "", e->sample,
+           *e->sample ? ")" : "");
     printf("file      %s\n", e->path);
-    printf("readings  %d of %d points, %lld with every attempt; %d of %d sweeps complete\n", c->progress.done,
-           c->progress.total, (long long)c->progress.readings, c->progress.sweeps_done, c->progress.sweeps);
+    printf("readings  %d of %d points, %lld with every attempt; %d of %d sweeps complete\n",
+           c->progress.done, c->progress.total, (long long)c->progress.readings,
+           c->progress.sweeps_done, c->progress.sweeps);
     if (c->reduced)
         printf("scale     u %.2g %% common to all, Omega %.4g sr\n", 100 * c->reduction.u_scale_rel,
                c->reduction.omega_sr);
@@ -267,9 +277,13 @@ static int run_show(const struct verb *verb, int argc, char **argv)
     return status;
 }
 
-const struct verb verb_show = {
-    "show", "FILE", "what is in a campaign: state, readings, fit",
-    "FILE is a campaign file, or the name or number that gonio list shows. With --sweep N its readings as a\n"
-    "table: angles from the encoders, f_r with its uncorrelated (u_a) and common (u_b) uncertainty, raw\n"
-    "voltages, every attempt with its flags.\n",
-    rows, run_show};
+const struct verb verb_show = {"show",
+                               "FILE",
+                               "what is in a campaign: state, readings, fit",
+                               "FILE is a campaign file, or the name or number that gonio list "
+                               "shows. With --sweep N its readings as a\n"
+                               "table: angles from the encoders, f_r with its uncorrelated (u_a) "
+                               "and common (u_b) uncertainty, raw\n"
+                               "voltages, every attempt with its flags.\n",
+                               rows,
+                               run_show};

@@ -19,7 +19,8 @@ struct verb {
     const char *summary;  // a few words for the list of verbs
     const char *about;    // paragraphs for `gonio help VERB`, each line ended
     const struct option_row *options;
-    int (*run)(const struct verb *verb, int argc, char **argv); // argv[0] is the verb; returns exit_status
+    // argv[0] is the verb; returns exit_status.
+    int (*run)(const struct verb *verb, int argc, char **argv);
 };
 
 extern const struct verb verb_plan, verb_check;

@@ -89,10 +89,11 @@ static struct http_reply get_status(const struct call *c)
     for (size_t i = 0; (run = queue_at(q, i)); i++)
         if (run != active && run->state == RUN_QUEUED)
             json_array_append_new(queued, json_integer(run->id));
-    json_t *o = json_pack("{s:s, s:i, s:b, s:I, s:f, s:s, s:I, s:s, s:o}", "version", GONIO_VERSION, "pid",
-                          (int)getpid(), "simulator", s.simulator, "seed", (json_int_t)s.seed, "uptime_s",
-                          s.uptime_s, "directory", s.directory, "event_id", (json_int_t)s.event_id,
-                          "last_error", s.last_error, "queued", queued);
+    json_t *o =
+        json_pack("{s:s, s:i, s:b, s:I, s:f, s:s, s:I, s:s, s:o}", "version", GONIO_VERSION, "pid",
+                  (int)getpid(), "simulator", s.simulator, "seed", (json_int_t)s.seed, "uptime_s",
+                  s.uptime_s, "directory", s.directory, "event_id", (json_int_t)s.event_id,
+                  "last_error", s.last_error, "queued", queued);
     json_object_set_new(o, "state", json_string(active ? run_state_name(active->state) : "idle"));
     json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
     json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
@@ -112,7 +113,8 @@ static struct http_reply get_run(const struct call *c)
 {
     char *end;
     long id = strtol(c->rest, &end, 10);
-    const struct run *run = *end || end == c->rest || id > 2147483647 ? NULL : queue_run(hub_queue(c->hub), (int)id);
+    const struct run *run =
+        *end || end == c->rest || id > 2147483647 ? NULL : queue_run(hub_queue(c->hub), (int)id);
     if (!run)
         return fail(404, "there is no such run", c->request->path, "see: gonio list");
     return reply(200, view_text(view_run(run, true)));
@@ -135,7 +137,8 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
     }
     json_int_t id = json_integer_value(what);
     if (!json_is_integer(what) || id < 1 || id > 2147483647)
-        return fail(400, "\"resume\" is neither a run's number nor a path", NULL, "see: gonio list");
+        return fail(400, "\"resume\" is neither a run's number nor a path", NULL,
+                    "see: gonio list");
     uint64_t event_id = hub_event_id(c->hub);
     if (hub_submit(c->hub, (int)id, &err) < 0)
         return failed(&err);
@@ -147,7 +150,8 @@ static struct http_reply create_run(const struct call *c, json_t *body)
     json_error_t e;
     const char *config, *name = "campaign.cfg";
     if (json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s}", "config", &config, "name", &name) < 0)
-        return fail(400, e.text, "the request's body", "send {\"config\": text, \"name\": path} or {\"resume\": run}");
+        return fail(400, e.text, "the request's body",
+                    "send {\"config\": text, \"name\": path} or {\"resume\": run}");
     hub_create(c->hub, config, name, c->ticket);
     return reply(HTTP_LATER, NULL);
 }
@@ -162,7 +166,8 @@ static struct http_reply post_runs(const struct call *c)
         return fail(400, e.text, where, "send one JSON object");
     }
     const json_t *what = json_object_get(body, "resume");
-    struct http_reply r = what && json_object_size(body) == 1 ? resume_run(c, what) : create_run(c, body);
+    struct http_reply r =
+        what && json_object_size(body) == 1 ? resume_run(c, what) : create_run(c, body);
     json_decref(body);
     return r;
 }
@@ -203,10 +208,14 @@ static const struct route {
     struct http_reply (*handle)(const struct call *c);
     const char *allow; // all methods of that path
 } routes[] = {
-    {"GET", "/api/v1/status", get_status, "GET"},     {"GET", "/api/v1/runs", get_runs, "GET, POST"},
-    {"POST", "/api/v1/runs", post_runs, "GET, POST"}, {"GET", "/api/v1/runs/", get_run, "GET"},
-    {"GET", "/api/v1/events", get_events, "GET"},     {"POST", "/api/v1/stop", post_stop, "POST"},
-    {"POST", "/api/v1/pause", post_pause, "POST"},    {"POST", "/api/v1/resume", post_resume, "POST"},
+    {"GET", "/api/v1/status", get_status, "GET"},
+    {"GET", "/api/v1/runs", get_runs, "GET, POST"},
+    {"POST", "/api/v1/runs", post_runs, "GET, POST"},
+    {"GET", "/api/v1/runs/", get_run, "GET"},
+    {"GET", "/api/v1/events", get_events, "GET"},
+    {"POST", "/api/v1/stop", post_stop, "POST"},
+    {"POST", "/api/v1/pause", post_pause, "POST"},
+    {"POST", "/api/v1/resume", post_resume, "POST"},
 };
 
 static const char *rest_of(const struct route *r, const char *path)
@@ -230,8 +239,10 @@ struct http_reply api_request(void *hub, const struct http_request *request, uin
         same_path = &routes[i];
     }
     if (!same_path)
-        return fail(404, "there is no such resource", request->path, "see /api/v1/status, /api/v1/runs, /api/v1/events");
-    struct http_reply r = fail(405, "that method is not for this resource", request->path, same_path->allow);
+        return fail(404, "there is no such resource", request->path,
+                    "see /api/v1/status, /api/v1/runs, /api/v1/events");
+    struct http_reply r =
+        fail(405, "that method is not for this resource", request->path, same_path->allow);
     r.allow = same_path->allow;
     return r;
 }

@@ -63,8 +63,9 @@ uint64_t events_add(struct events *e, const char *kind, const char *data)
     assert(data[0] == '{' && !strchr(data, '\n'));
     char *text;
     const char *rest = data + 1, *comma = *rest == '}' ? "" : ",";
-    int n = asprintf(&text, "id: %" PRIu64 "\nevent: %s\ndata: {\"event\":\"%s\",\"id\":%" PRIu64 "%s%s\n\n",
-                     e->next_id, kind, kind, e->next_id, comma, rest);
+    int n = asprintf(
+        &text, "id: %" PRIu64 "\nevent: %s\ndata: {\"event\":\"%s\",\"id\":%" PRIu64 "%s%s\n\n",
+        e->next_id, kind, kind, e->next_id, comma, rest);
     if (n < 0)
         return 0;
     while (e->count && (e->count == e->most || e->bytes + (size_t)n > e->most_bytes))

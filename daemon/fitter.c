@@ -47,7 +47,8 @@ void fit_outcome_free(void *outcome)
     free(o);
 }
 
-// --- one fit --------------------------------------------------------------------------------------
+// --- one fit
+// --------------------------------------------------------------------------------------
 
 static bool canceled(void *ctx)
 {
@@ -72,8 +73,8 @@ static struct dataset_filter filter_of(const struct campaign_config *c, int swee
     return filter;
 }
 
-static int run_fit(struct fitter *f, const struct campaign_config *config, const struct dataset *data,
-                   struct fit_outcome *o, struct gon_error *err)
+static int run_fit(struct fitter *f, const struct campaign_config *config,
+                   const struct dataset *data, struct fit_outcome *o, struct gon_error *err)
 {
     size_t size;
     struct trace trace = {open_memstream(&o->trace, &size), 0};
@@ -152,7 +153,8 @@ void fitter_step(struct fitter *f, struct note *n)
     note_free(n);
 }
 
-// --- the thread -----------------------------------------------------------------------------------
+// --- the thread
+// -----------------------------------------------------------------------------------
 
 static void *thread_main(void *ctx)
 {
@@ -166,7 +168,8 @@ static void *thread_main(void *ctx)
     return NULL;
 }
 
-int fitter_start(const struct fitter_links *links, struct fitter **ret_fitter, struct gon_error *err)
+int fitter_start(const struct fitter_links *links, struct fitter **ret_fitter,
+                 struct gon_error *err)
 {
     struct fitter *f = fitter_new(links);
     if (!f)

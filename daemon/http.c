@@ -57,7 +57,8 @@ struct http {
 
 char *http_error(const char *error, const char *where, const char *what_to_do)
 {
-    json_t *o = json_pack("{s:s, s:s*, s:s}", "error", error, "where", where, "what_to_do", what_to_do);
+    json_t *o =
+        json_pack("{s:s, s:s*, s:s}", "error", error, "where", where, "what_to_do", what_to_do);
     char *text = o ? json_dumps(o, JSON_COMPACT) : NULL;
     json_decref(o);
     return text ? text : strdup("{\"error\":\"out of memory\",\"what_to_do\":\"try again\"}");
@@ -75,7 +76,8 @@ struct framing {
     unsigned long long length;
 };
 
-static enum MHD_Result count_framing(void *cls, enum MHD_ValueKind kind, const char *key, const char *value)
+static enum MHD_Result count_framing(void *cls, enum MHD_ValueKind kind, const char *key,
+                                     const char *value)
 {
     struct framing *f = cls;
     (void)kind;
@@ -93,15 +95,19 @@ static struct http_reply check_header(struct http *h, struct MHD_Connection *c)
 {
     struct framing f = {0};
     MHD_get_connection_values(c, MHD_HEADER_KIND, count_framing, &f);
-    const union MHD_ConnectionInfo *size = MHD_get_connection_info(c, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    const union MHD_ConnectionInfo *size =
+        MHD_get_connection_info(c, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
     if (f.lengths + f.encodings > 1)
-        return refuse(400, "the request gives its length more than once (Content-Length, Transfer-Encoding)",
-                      "send one of them");
+        return refuse(
+            400, "the request gives its length more than once (Content-Length, Transfer-Encoding)",
+            "send one of them");
     if (h->connections > MOST_CONNECTIONS)
         return refuse(503, "too many connections (32)", "close some and try again");
     if (size && size->header_size > MOST_HEADER)
-        return refuse(431, "the request's header is larger than 8 KiB", "send fewer or shorter header lines");
-    if (f.length > MOST_SWALLOWED) // less is read to its end, so that the client is there for the answer
+        return refuse(431, "the request's header is larger than 8 KiB",
+                      "send fewer or shorter header lines");
+    if (f.length >
+        MOST_SWALLOWED) // less is read to its end, so that the client is there for the answer
         return refuse(413, "the request's body is larger than 64 KiB", "send a smaller one");
     return (struct http_reply){0};
 }
@@ -145,7 +151,8 @@ static int last_seen(struct exchange *x, uint64_t *ret_id)
 
 static int descriptor(struct MHD_Connection *c)
 {
-    const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_CONNECTION_FD);
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(c, MHD_CONNECTION_INFO_CONNECTION_FD);
     return info ? info->connect_fd : -1;
 }
 
@@ -164,7 +171,8 @@ static enum MHD_Result send_stream(struct exchange *x)
     if (x->http->streams >= MOST_STREAMS)
         x->reply = refuse(503, "too many event streams (8)", "stop one of the others that watch");
     else if (last_seen(x, &seen) < 0)
-        x->reply = refuse(400, "Last-Event-ID is not a number", "send the id of the last event seen");
+        x->reply =
+            refuse(400, "Last-Event-ID is not a number", "send the id of the last event seen");
     else if (!(x->stream = stream_new(x->connection, x->http->events, seen)))
         x->reply = refuse(500, "out of memory", "try again");
     if (!x->stream)
@@ -230,10 +238,11 @@ static struct http_reply handle(struct exchange *x, const char *method, const ch
         return refuse(413, "the request's body is larger than 64 KiB", "send a smaller one");
     if (x->http->stopping)
         return refuse(503, "the daemon is ending", "start it again");
-    struct http_request r = {.method = method, .path = path, .body = x->body ? x->body : "", .size = x->size};
+    struct http_request r = {
+        .method = method, .path = path, .body = x->body ? x->body : "", .size = x->size};
     peer_of(x->connection, &r);
-    log_say(x->http->log, strcmp(method, "GET") ? LOG_INFO : LOG_DEBUG, "http", "%s %s from pid %ld uid %ld",
-            method, path, r.pid, r.uid);
+    log_say(x->http->log, strcmp(method, "GET") ? LOG_INFO : LOG_DEBUG, "http",
+            "%s %s from pid %ld uid %ld", method, path, r.pid, r.uid);
     return x->http->ports.request(x->http->ports.ctx, &r, x->ticket);
 }
 
@@ -242,8 +251,11 @@ static struct exchange *begin(struct http *h, struct MHD_Connection *c)
     struct exchange *x = calloc(1, sizeof *x);
     if (!x)
         return NULL;
-    *x = (struct exchange){.next = h->exchanges, .http = h, .connection = c, .ticket = ++h->next_ticket,
-                            .watched_fd = -1};
+    *x = (struct exchange){.next = h->exchanges,
+                           .http = h,
+                           .connection = c,
+                           .ticket = ++h->next_ticket,
+                           .watched_fd = -1};
     h->exchanges = x;
     return x;
 }
@@ -360,8 +372,8 @@ __attribute__((format(printf, 2, 0))) static void say(void *ctx, const char *for
 static struct MHD_Daemon *start(struct http *h, int fd)
 {
     return MHD_start_daemon(
-        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL, access_handler, h,
-        MHD_OPTION_EXTERNAL_LOGGER, say, h, // first, so that it hears of the others
+        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL, access_handler,
+        h, MHD_OPTION_EXTERNAL_LOGGER, say, h, // first, so that it hears of the others
         MHD_OPTION_LISTEN_SOCKET, fd, MHD_OPTION_NOTIFY_COMPLETED, request_ended, h,
         MHD_OPTION_NOTIFY_CONNECTION, connection_changed, h, MHD_OPTION_CONNECTION_LIMIT,
         (unsigned)(MOST_CONNECTIONS + SPARE_CONNECTIONS), MHD_OPTION_CONNECTION_MEMORY_LIMIT,
@@ -387,7 +399,8 @@ struct http *http_new(struct loop *loop, int listen_fd, const struct events *eve
         return NULL;
     }
     h->epoll_fd = MHD_get_daemon_info(h->mhd, MHD_DAEMON_INFO_EPOLL_FD)->listen_fd;
-    if (loop_add(loop, h->epoll_fd, ready, h, err) < 0 || loop_every(loop, PING_MS, ping, h, err) < 0) {
+    if (loop_add(loop, h->epoll_fd, ready, h, err) < 0 ||
+        loop_every(loop, PING_MS, ping, h, err) < 0) {
         http_free(h);
         return NULL;
     }
@@ -395,8 +408,8 @@ struct http *http_new(struct loop *loop, int listen_fd, const struct events *eve
     return h;
 }
 
-// What waits is answered and each stream ended, with a few rounds to send it: the library may not be
-// stopped while a connection is suspended.
+// What waits is answered and each stream ended, with a few rounds to send it: the library may not
+// be stopped while a connection is suspended.
 void http_free(struct http *h)
 {
     if (!h)
@@ -408,7 +421,8 @@ void http_free(struct http *h)
         if (x->stream)
             stream_close(x->stream);
         else if (x->stage == WAITING)
-            http_answer(h, x->ticket, 503, http_error("the daemon is ending", NULL, "start it again"));
+            http_answer(h, x->ticket, 503,
+                        http_error("the daemon is ending", NULL, "start it again"));
     }
     for (int i = 0; i < 5; i++)
         MHD_run(h->mhd);

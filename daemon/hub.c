@@ -38,7 +38,8 @@ struct hub {
     bool ready_said, listed, ending, ended_said;
 };
 
-// --- what is told to those who watch --------------------------------------------------------------
+// --- what is told to those who watch
+// --------------------------------------------------------------
 
 static void publish(struct hub *h, const char *kind, json_t *data)
 {
@@ -88,8 +89,8 @@ static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
     bool bad = run->state == RUN_FAILED || run->state == RUN_PAUSED;
-    log_say(h->options.log, bad ? LOG_WARN : LOG_NOTICE, "run", "%d %s%s%s", run->id, run_state_name(run->state),
-            *run->text ? ": " : "", run->text);
+    log_say(h->options.log, bad ? LOG_WARN : LOG_NOTICE, "run", "%d %s%s%s", run->id,
+            run_state_name(run->state), *run->text ? ": " : "", run->text);
     if (bad)
         snprintf(h->last_error, sizeof h->last_error, "%s", run->text);
     publish(h, "state", view_run(run, false));
@@ -113,10 +114,12 @@ static void happened(struct hub *h, const struct note *n)
     } else if (n->event.kind == ENGINE_READING) {
         json_object_set_new(o, "sweep", json_integer(n->sweep)); // the plan's own names for it
         json_object_set_new(o, "point", json_integer(n->point));
-        log_say(h->options.log, LOG_INFO, "reading", "run %d, %d of %d, theta_i %g theta_r %g deg, f_r %.5g /sr",
-                n->run, run->done, run->total, run->theta_i_deg, run->theta_r_deg, run->f_per_sr);
+        log_say(h->options.log, LOG_INFO, "reading",
+                "run %d, %d of %d, theta_i %g theta_r %g deg, f_r %.5g /sr", n->run, run->done,
+                run->total, run->theta_i_deg, run->theta_r_deg, run->f_per_sr);
     } else {
-        log_say(h->options.log, LOG_NOTICE, "run", "%d: sweep %d of %d", n->run, run->sweep, run->sweeps);
+        log_say(h->options.log, LOG_NOTICE, "run", "%d: sweep %d of %d", n->run, run->sweep,
+                run->sweeps);
     }
     publish(h, kinds[n->event.kind], o);
 }
@@ -131,12 +134,14 @@ static void fitted(struct hub *h, const struct note *n)
     else
         json_object_set_new(o, "error", json_string(n->err.text));
     if (!fit && !canceled)
-        log_say(h->options.log, LOG_WARN, "fit", "run %d after sweep %d: %s", n->run, n->sweep, n->err.text);
+        log_say(h->options.log, LOG_WARN, "fit", "run %d after sweep %d: %s", n->run, n->sweep,
+                n->err.text);
     publish(h, "fit", o);
     queue_fitted(h->queue, n->run, fit ? n->text : NULL, &n->err);
 }
 
-// --- what the queue asks for ----------------------------------------------------------------------
+// --- what the queue asks for
+// ----------------------------------------------------------------------
 
 static struct note *about(enum note_kind kind, const struct run *run)
 {
@@ -192,7 +197,8 @@ static void rearm_port(void *ctx)
         cancel_reset(h->cancel); // no worker is at work: none can miss it
 }
 
-// --- requests -------------------------------------------------------------------------------------
+// --- requests
+// -------------------------------------------------------------------------------------
 
 uint64_t hub_event_id(const struct hub *h)
 {
@@ -255,7 +261,8 @@ int hub_submit(struct hub *h, int run, struct gon_error *err)
 void hub_stop(struct hub *h, const char *why, uint64_t ticket)
 {
     if (h->stop_count == MOST_STOPS)
-        http_answer(h->http, ticket, 503, http_error("a stop is under way", NULL, "see: gonio status"));
+        http_answer(h->http, ticket, 503,
+                    http_error("a stop is under way", NULL, "see: gonio status"));
     else
         h->stops[h->stop_count++] = ticket;
     if (!queue_stop(h->queue, why))
@@ -267,9 +274,11 @@ static int to_active(struct hub *h, enum note_kind kind, bool paused, struct gon
     const struct run *run = queue_active(h->queue);
     if (!run)
         return gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
-    bool right = paused ? run->state == RUN_PAUSED : run->state == RUN_RUNNING || run->state == RUN_PREPARING;
+    bool right = paused ? run->state == RUN_PAUSED
+                        : run->state == RUN_RUNNING || run->state == RUN_PREPARING;
     if (!right)
-        return gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id, run_state_name(run->state));
+        return gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
+                        run_state_name(run->state));
     note_post(h->run_box, note_new(kind));
     return run->id;
 }
@@ -284,7 +293,8 @@ int hub_resume(struct hub *h, struct gon_error *err)
     return to_active(h, NOTE_RESUME, true, err);
 }
 
-// --- what the workers say -------------------------------------------------------------------------
+// --- what the workers say
+// -------------------------------------------------------------------------
 
 static void known(struct hub *h, struct note *n)
 {
@@ -297,7 +307,8 @@ static void known(struct hub *h, struct note *n)
     } else {
         if (rc == GON_E_STORE)
             snprintf(h->last_error, sizeof h->last_error, "%s", err.text);
-        http_answer(h->http, n->ticket, api_status(rc), api_error(rc, n->text ? n->text : err.text));
+        http_answer(h->http, n->ticket, api_status(rc),
+                    api_error(rc, n->text ? n->text : err.text));
     }
 }
 
@@ -380,12 +391,14 @@ static void mail_arrived(void *ctx)
     say_when_ended(h);
 }
 
-// --- beginning and end ----------------------------------------------------------------------------
+// --- beginning and end
+// ----------------------------------------------------------------------------
 
 static int start_workers(struct hub *h, struct gon_error *err)
 {
-    struct storer_links s = {clk_system(), h->options.bench, h->options.bench_text, h->options.directory,
-                             h->store_box, h->box, h->run_box};
+    struct storer_links s = {
+        clk_system(), h->options.bench, h->options.bench_text, h->options.directory, h->store_box,
+        h->box,       h->run_box};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
     struct runner_links r = {h->options.bench, h->cancel, h->run_box, h->box, h->store_box};
     int rc = storer_start(&s, &h->storer, err);
@@ -395,9 +408,11 @@ static int start_workers(struct hub *h, struct gon_error *err)
 
 static int build(struct hub *h, int listen_fd, struct gon_error *err)
 {
-    struct queue_ports q = {h, open_port, start_port, fit_port, close_port, cancel_port, rearm_port, changed};
+    struct queue_ports q = {h,          open_port,   start_port, fit_port,
+                            close_port, cancel_port, rearm_port, changed};
     struct http_ports p = {h, api_request};
-    // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be late.
+    // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be
+    // late.
     uint64_t first_id = (uint64_t)(clk_utc_ns(clk_system()) / 1000000000) * 1000;
     h->box = mail_new();
     h->store_box = mail_new();
@@ -406,7 +421,8 @@ static int build(struct hub *h, int listen_fd, struct gon_error *err)
     h->cancel = cancel_new();
     h->events = events_new(MOST_EVENTS, MOST_EVENT_BYTES, first_id);
     h->queue = queue_new(&q);
-    if (!h->box || !h->store_box || !h->run_box || !h->fit_box || !h->cancel || !h->events || !h->queue)
+    if (!h->box || !h->store_box || !h->run_box || !h->fit_box || !h->cancel || !h->events ||
+        !h->queue)
         return gon_fail(err, GON_E_SYSTEM, "daemon: out of memory or descriptors");
     int rc = loop_add(h->loop, mail_fd(h->box), mail_arrived, h, err);
     rc = rc < 0 ? rc : start_workers(h, err);
@@ -416,8 +432,8 @@ static int build(struct hub *h, int listen_fd, struct gon_error *err)
     return h->http ? GON_OK : GON_E_SYSTEM;
 }
 
-int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options, struct hub **ret_hub,
-            struct gon_error *err)
+int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options,
+            struct hub **ret_hub, struct gon_error *err)
 {
     struct hub *h = calloc(1, sizeof *h);
     if (!h)
@@ -444,7 +460,8 @@ void hub_end(struct hub *h)
     say_when_ended(h);
 }
 
-// The instrument thread goes first: it is the one that switches off. The store outlives those who write.
+// The instrument thread goes first: it is the one that switches off. The store outlives those who
+// write.
 void hub_free(struct hub *h)
 {
     if (!h)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The middle of the daemon: on the main thread it passes messages between the queue, the workers and HTTP.
-// It touches no device and no file itself.
+// The middle of the daemon: on the main thread it passes messages between the queue, the workers
+// and HTTP. It touches no device and no file itself.
 #pragma once
 #include "base/err.h"
 #include "daemon/events.h"
@@ -23,13 +23,15 @@ struct hub_options {
     bool simulator;
     long seed;
     struct log *log;
-    void (*ready)(void *ctx, const struct instrument_snapshot *s); // once, when the bench was looked at
-    void (*ended)(void *ctx, const struct gon_error *err);         // workers are idle; err: why it could not go on
+    // Once, when the bench was looked at.
+    void (*ready)(void *ctx, const struct instrument_snapshot *s);
+    // The workers are idle; err: why it could not go on.
+    void (*ended)(void *ctx, const struct gon_error *err);
     void *ctx;
 };
 
-int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options, struct hub **ret_hub,
-            struct gon_error *err);
+int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options,
+            struct hub **ret_hub, struct gon_error *err);
 void hub_end(struct hub *h);  // laser off, axes stopped, everything committed; then ended is called
 void hub_free(struct hub *h); // joins the workers; NULL is fine
 

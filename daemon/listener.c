@@ -33,11 +33,12 @@ static int make_folder(const char *path, struct gon_error *err)
         return GON_OK;
     *slash = 0;
     if (mkdir(folder, 0700) < 0 && errno != EEXIST)
-        return gon_fail(err, GON_E_INPUT, "socket %s: folder %s: %s; choose another with --socket", path,
-                        folder, strerror(errno));
+        return gon_fail(err, GON_E_INPUT, "socket %s: folder %s: %s; choose another with --socket",
+                        path, folder, strerror(errno));
     if (!strncmp(folder, "/tmp/goniod-", 12) &&
         (lstat(folder, &st) < 0 || !S_ISDIR(st.st_mode) || st.st_uid != geteuid()))
-        return gon_fail(err, GON_E_REFUSED, "socket folder %s belongs to somebody else; choose another with --socket",
+        return gon_fail(err, GON_E_REFUSED,
+                        "socket folder %s belongs to somebody else; choose another with --socket",
                         folder);
     return GON_OK;
 }
@@ -47,12 +48,13 @@ static int refuse_second(const struct listener *l, int fd, struct gon_error *err
     char pid[32] = "";
     ssize_t n = pread(fd, pid, sizeof pid - 1, 0);
     pid[n > 0 ? strcspn(pid, "\n") : 0] = 0;
-    return gon_fail(err, GON_E_REFUSED, "already running%s%s on %s; stop it, or choose another socket with --socket",
+    return gon_fail(err, GON_E_REFUSED,
+                    "already running%s%s on %s; stop it, or choose another socket with --socket",
                     *pid ? ", pid " : "", pid, l->path);
 }
 
-// A lock file may be removed by its holder between our open and our flock: then the lock is on a file
-// that nobody will find, and we try again.
+// A lock file may be removed by its holder between our open and our flock: then the lock is on a
+// file that nobody will find, and we try again.
 static int take_lock(struct listener *l, struct gon_error *err)
 {
     for (int tries = 0; tries < 10; tries++) {
@@ -66,7 +68,8 @@ static int take_lock(struct listener *l, struct gon_error *err)
             close(fd);
             return rc;
         }
-        if (fstat(fd, &held) == 0 && stat(l->lock_path, &named) == 0 && held.st_ino == named.st_ino) {
+        if (fstat(fd, &held) == 0 && stat(l->lock_path, &named) == 0 &&
+            held.st_ino == named.st_ino) {
             l->lock_fd = fd;
             if (ftruncate(fd, 0) == 0)
                 dprintf(fd, "%ld\n", (long)getpid());
@@ -74,7 +77,8 @@ static int take_lock(struct listener *l, struct gon_error *err)
         }
         close(fd);
     }
-    return gon_fail(err, GON_E_REFUSED, "lock %s: other daemons come and go; try again", l->lock_path);
+    return gon_fail(err, GON_E_REFUSED, "lock %s: other daemons come and go; try again",
+                    l->lock_path);
 }
 
 static int listen_there(struct listener *l, struct gon_error *err)
@@ -83,8 +87,8 @@ static int listen_there(struct listener *l, struct gon_error *err)
     struct stat st;
     memcpy(address.sun_path, l->path, sizeof l->path);
     if (lstat(l->path, &st) == 0 && !S_ISSOCK(st.st_mode))
-        return gon_fail(err, GON_E_INPUT, "%s exists and is not a socket; choose another with --socket",
-                        l->path);
+        return gon_fail(err, GON_E_INPUT,
+                        "%s exists and is not a socket; choose another with --socket", l->path);
     unlink(l->path); // we hold the lock: whoever made it is gone
     l->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     mode_t mask = umask(0117);

@@ -52,7 +52,8 @@ void loop_free(struct loop *loop)
     free(loop);
 }
 
-static struct source *add(struct loop *loop, int fd, uint32_t what, void *ctx, struct gon_error *err)
+static struct source *add(struct loop *loop, int fd, uint32_t what, void *ctx,
+                          struct gon_error *err)
 {
     struct source *s = calloc(1, sizeof *s);
     struct epoll_event e = {.events = what, .data.ptr = s};
@@ -83,7 +84,8 @@ int loop_add(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, str
     return add_ready(loop, fd, EPOLLIN, ready, ctx, err);
 }
 
-int loop_add_hangup(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx, struct gon_error *err)
+int loop_add_hangup(struct loop *loop, int fd, void (*ready)(void *ctx), void *ctx,
+                    struct gon_error *err)
 {
     return add_ready(loop, fd, EPOLLRDHUP, ready, ctx, err);
 }

@@ -27,17 +27,20 @@ static const struct option_row rows[] = {
      "the bench, for example goniod.cfg"},
     {"--sim", OPTION_FLAG, offsetof(struct options, sim), NULL, 0, 0,
      "a simulated bench instead: no hardware, no file"},
-    {"--fast", OPTION_FLAG, offsetof(struct options, fast), NULL, 0, 0, "with --sim: quick axes and filters"},
+    {"--fast", OPTION_FLAG, offsetof(struct options, fast), NULL, 0, 0,
+     "with --sim: quick axes and filters"},
     {"--seed", OPTION_INT, offsetof(struct options, seed), "N", 0, 4294967295.0,
      "with --sim: of its noise (7)"},
     {"--socket", OPTION_TEXT, offsetof(struct options, socket), "PATH", 0, 0,
      "where gonio finds it ($GONIO_SOCKET)"},
-    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0, "where campaigns go ($GONIO_DIR)"},
+    {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
+     "where campaigns go ($GONIO_DIR)"},
     {"--log", OPTION_TEXT, offsetof(struct options, log), "LEVEL", 0, 0,
      "error, warning, notice, info or debug (notice)"},
     {"--help", OPTION_FLAG, offsetof(struct options, help), NULL, 0, 0, "this"},
     {"--version", OPTION_FLAG, offsetof(struct options, version), NULL, 0, 0, "the version"},
-    {"--options", OPTION_FLAG, offsetof(struct options, options), NULL, 0, 0, "this list for the manual page"},
+    {"--options", OPTION_FLAG, offsetof(struct options, options), NULL, 0, 0,
+     "this list for the manual page"},
     {NULL, OPTION_FLAG, 0, NULL, 0, 0, NULL},
 };
 
@@ -69,7 +72,8 @@ static int log_level(const char *name, enum log_level *ret_level, struct gon_err
             return GON_OK;
         }
     const char *meant = options_suggest(name, names);
-    return gon_fail(err, GON_E_INPUT, "--log '%s': did you mean '%s'? error, warning, notice, info, debug", name,
+    return gon_fail(err, GON_E_INPUT,
+                    "--log '%s': did you mean '%s'? error, warning, notice, info, debug", name,
                     meant ? meant : "notice");
 }
 
@@ -82,31 +86,39 @@ static int check_options(const struct options *o, int operands, struct gon_error
     if (!o->sim && (o->fast || o->seed >= 0))
         return gon_fail(err, GON_E_INPUT, "--fast and --seed are for --sim; add --sim");
     if (!o->sim && !o->config)
-        return gon_fail(err, GON_E_INPUT, "which bench? goniod --config goniod.cfg, or goniod --sim for a simulated one");
+        return gon_fail(
+            err, GON_E_INPUT,
+            "which bench? goniod --config goniod.cfg, or goniod --sim for a simulated one");
     return GON_OK;
 }
 
 static void print_help(void)
 {
-    printf("usage: goniod --config FILE [OPTIONS]\n       goniod --sim [--fast] [--seed N] [OPTIONS]\n\n"
-           "Runs the goniometer: owns its devices, measures queued campaigns, fits after each sweep.\n\n");
+    printf("usage: goniod --config FILE [OPTIONS]\n       goniod --sim [--fast] [--seed N] "
+           "[OPTIONS]\n\n"
+           "Runs the goniometer: owns its devices, measures queued campaigns, fits after each "
+           "sweep.\n\n");
     options_describe(stdout, rows);
-    printf("\nSIGTERM or Ctrl-C: laser off, axes stopped, everything stored, then the end. The command: gonio help\n");
+    printf("\nSIGTERM or Ctrl-C: laser off, axes stopped, everything stored, then the end. The "
+           "command: gonio help\n");
 }
 
-// --- callbacks of the loop ------------------------------------------------------------------------
+// --- callbacks of the loop
+// ------------------------------------------------------------------------
 
 static void signaled(void *ctx, int signal)
 {
     struct daemon *d = ctx;
-    log_say(d->log, LOG_NOTICE, "goniod", "signal %d: laser off, axes stopped, then the end", signal);
+    log_say(d->log, LOG_NOTICE, "goniod", "signal %d: laser off, axes stopped, then the end",
+            signal);
     hub_end(d->hub);
 }
 
 static void simulator_ended(void *ctx)
 {
     struct daemon *d = ctx;
-    log_say(d->log, LOG_ERR, "simulator", "goniosim ended by itself; end goniod and start it again");
+    log_say(d->log, LOG_ERR, "simulator",
+            "goniosim ended by itself; end goniod and start it again");
     loop_remove(d->loop, simulator_fd(d->simulator));
 }
 
@@ -135,13 +147,15 @@ static void ready(void *ctx, const struct instrument_snapshot *s)
     for (int i = 0; i < PART_COUNT; i++)
         if (s->part[i].link == PART_LOST)
             printf("waiting for %s: %s\n", s->part[i].name, s->part[i].problem);
-    bool lost = s->part[PART_LASER].link != PART_OK, on = s->emission || s->off_unconfirmed || s->laser.emission;
+    bool lost = s->part[PART_LASER].link != PART_OK,
+         on = s->emission || s->off_unconfirmed || s->laser.emission;
     printf("ready: axes %s, laser %s.   Ctrl-C stops (laser off first).\n", axes_text(s),
            lost ? "not reachable" : on ? "NOT OFF: use its key or the interlock" : "off");
     fflush(stdout);
 }
 
-// --- beginning and end ----------------------------------------------------------------------------
+// --- beginning and end
+// ----------------------------------------------------------------------------
 
 // All threads inherit the mask: signals are for the loop's descriptor.
 static void block_signals(void)
@@ -172,7 +186,8 @@ static int open_bench(struct daemon *d, struct gon_error *err)
         path = simulator_config(d->simulator);
     }
     if (bench_config_load(path, (struct cfg_sink){say_line, NULL}, &d->bench, &d->bench_text) < 0)
-        return gon_fail(err, GON_E_INPUT, "%s: mend the bench file; see: gonio check %s", path, path);
+        return gon_fail(err, GON_E_INPUT, "%s: mend the bench file; see: gonio check %s", path,
+                        path);
     return GON_OK;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the instrument thread needs to run or to go on with a campaign, read from its file by the store
-// thread and given away with the message.
+// What the instrument thread needs to run or to go on with a campaign, read from its file by the
+// store thread and given away with the message.
 #pragma once
 #include "campaign/config.h"
 #include "campaign/plan.h"
@@ -12,7 +12,8 @@ struct run_material {
     struct campaign_config config;
     struct plan plan; // with what is done
     struct engine_opening opening;
-    bool has_opening; // the campaign goes on: opening holds the means of its first dark and beam readings
+    bool has_opening; // the campaign goes on: opening holds the means of its first dark and beam
+                      // readings
 };
 
 void run_material_free(void *material); // NULL is fine

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the daemon's threads tell each other: one kind of message with a few fields, of which each kind uses
-// those named beside it. A note belongs to whoever holds it.
+// What the daemon's threads tell each other: one kind of message with a few fields, of which each
+// kind uses those named beside it. A note belongs to whoever holds it.
 #pragma once
 #include "base/err.h"
 #include "base/mail.h"
@@ -56,7 +56,8 @@ struct note {
     void (*drop)(void *thing); // how to free the thing; NULL: free
 };
 
-struct note *note_new(enum note_kind kind); // ends the program without memory: nothing can be told then
+// Ends the program without memory: nothing can be told then.
+struct note *note_new(enum note_kind kind);
 void note_free(struct note *n);             // NULL is fine
 void note_drop(struct letter *l);           // the same, for mail_free
 void note_post(struct mail *to, struct note *n);

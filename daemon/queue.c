@@ -194,7 +194,8 @@ void queue_opened(struct queue *q, int id, void *material, const struct gon_erro
         return;
     }
     q->phase = MEASURING;
-    q->ports.start(q->ports.ctx, q->active, material); // also when stopping: the engine then ends at once
+    q->ports.start(q->ports.ctx, q->active,
+                   material); // also when stopping: the engine then ends at once
 }
 
 void queue_engine_event(struct queue *q, int id, const struct engine_event *event)
@@ -216,7 +217,8 @@ void queue_engine_event(struct queue *q, int id, const struct engine_event *even
         run->flags = event->flags;
     }
     // How it ends is said when the file is closed, and a stop under way is not taken back.
-    bool ends = event->state == RUN_DONE || event->state == RUN_STOPPED || event->state == RUN_FAILED;
+    bool ends =
+        event->state == RUN_DONE || event->state == RUN_STOPPED || event->state == RUN_FAILED;
     if (event->kind == ENGINE_STATE && !ends && !q->stopping)
         change(q, run, event->state, event->text);
 }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The runs: which one is measured, which wait, what became of the others. A core without threads, files
-// or devices: it is told what happened and says through its ports what to do next, so that tests step it.
+// The runs: which one is measured, which wait, what became of the others. A core without threads,
+// files or devices: it is told what happened and says through its ports what to do next, so that
+// tests step it.
 //
-//   submit -> queued -> open (store) -> start (instrument) -> fits -> close (store) -> done | stopped | failed
+//   submit -> queued -> open (store) -> start (instrument) -> fits -> close (store)
+//   -> done | stopped | failed
 //
-// One run has the bench at a time; a run is finished when its last fit is stored and its file is closed.
-// A stop ends the run that has the bench and puts back those that wait: nothing starts by itself after a
-// stop. Thread: main.
+// One run has the bench at a time; a run is finished when its last fit is stored and its file is
+// closed. A stop ends the run that has the bench and puts back those that wait: nothing starts by
+// itself after a stop. Thread: main.
 #pragma once
 #include "daemon/engine.h"
 
@@ -22,7 +24,8 @@ struct run {
     char text[480];      // why it is paused, stopped or failed; "" otherwise
     int sweep, sweeps;   // 0 while preparing
     int done, total;     // points
-    double theta_i_deg, theta_r_deg, f_per_sr, u_per_sr; // of the last reading; NAN before there is one
+    // Of the last reading; NAN before there is one.
+    double theta_i_deg, theta_r_deg, f_per_sr, u_per_sr;
     unsigned flags;
     double left_s;       // NAN unknown
     bool emission;
@@ -34,7 +37,8 @@ struct run {
 struct queue_ports {
     void *ctx;
     void (*open)(void *ctx, const struct run *run);  // queue_opened answers
-    void (*start)(void *ctx, const struct run *run, void *material); // queue_ended answers; material given away
+    // queue_ended answers; material is given away.
+    void (*start)(void *ctx, const struct run *run, void *material);
     void (*fit)(void *ctx, const struct run *run, int sweep, bool last); // queue_fitted answers
     void (*close)(void *ctx, const struct run *run, enum run_state as); // queue_closed answers
     void (*cancel)(void *ctx);   // ask the workers to stop
@@ -45,12 +49,12 @@ struct queue_ports {
 struct queue *queue_new(const struct queue_ports *ports); // NULL without memory
 void queue_free(struct queue *q);
 
-// A run that exists as a file, with its state there. An id that is known is brought up to date, unless
-// the run has the bench or waits. NULL without memory.
+// A run that exists as a file, with its state there. An id that is known is brought up to date,
+// unless the run has the bench or waits. NULL without memory.
 struct run *queue_know(struct queue *q, const struct run *run);
 
-// Queues a known run. GON_E_INPUT: no such run; GON_E_REFUSED: it is done, is queued or has the bench
-// already, or the daemon is ending.
+// Queues a known run. GON_E_INPUT: no such run; GON_E_REFUSED: it is done, is queued or has the
+// bench already, or the daemon is ending.
 int queue_submit(struct queue *q, int id, struct gon_error *err);
 
 // Ends the run that has the bench and empties the queue; false when there is nothing to stop.
@@ -61,11 +65,13 @@ void queue_end(struct queue *q); // as stop, and nothing can be submitted afterw
 void queue_opened(struct queue *q, int id, void *material, const struct gon_error *err);
 void queue_engine_event(struct queue *q, int id, const struct engine_event *event);
 void queue_fit_asked(struct queue *q, int id, int sweep, bool last);
-void queue_fitted(struct queue *q, int id, const char *fit, const struct gon_error *err); // fit NULL: it failed
+// fit NULL: it failed.
+void queue_fitted(struct queue *q, int id, const char *fit, const struct gon_error *err);
 void queue_ended(struct queue *q, int id, enum run_state state, const struct gon_error *err);
 void queue_closed(struct queue *q, int id, const struct gon_error *err); // err NULL: closed well
 
 const struct run *queue_active(const struct queue *q); // has the bench; NULL: none
 const struct run *queue_run(const struct queue *q, int id);
-const struct run *queue_at(const struct queue *q, size_t index); // by rising id; NULL beyond the last
+// By rising id; NULL beyond the last.
+const struct run *queue_at(const struct queue *q, size_t index);
 bool queue_idle(const struct queue *q); // no run has the bench

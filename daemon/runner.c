@@ -35,7 +35,8 @@ struct runner {
     int64_t next_snapshot_ns; // not before every part was asked once
 };
 
-// --- what the others say --------------------------------------------------------------------------
+// --- what the others say
+// --------------------------------------------------------------------------
 
 static void take(struct runner *r, struct note *n)
 {
@@ -84,7 +85,8 @@ static void watch(void *ctx)
     send_snapshot(r);
 }
 
-// --- the engine's ports ---------------------------------------------------------------------------
+// --- the engine's ports
+// ---------------------------------------------------------------------------
 
 static bool same_reading(const struct store_reading *a, const struct store_reading *b)
 {
@@ -100,15 +102,16 @@ static int wait_stored(struct runner *r, struct gon_error *err)
             take(r, n);
         instrument_breathe(r->in);
         if (clk_now_ns(clk_system()) > end_ns)
-            return gon_fail(err, GON_E_STORE, "store: no acknowledgement for 10 s; is the disk full, slow or gone?");
+            return gon_fail(err, GON_E_STORE,
+                            "store: no acknowledgement for 10 s; is the disk full, slow or gone?");
     }
     if (r->answer.code && err)
         *err = r->answer;
     return r->answer.code;
 }
 
-// A row that was not acknowledged in time is offered again by the engine: then its answer is waited for
-// once more, and only a refused one is sent again.
+// A row that was not acknowledged in time is offered again by the engine: then its answer is waited
+// for once more, and only a refused one is sent again.
 static int store_reading_port(void *ctx, const struct store_reading *reading, struct gon_error *err)
 {
     struct runner *r = ctx;
@@ -190,7 +193,8 @@ static bool take_pause_port(void *ctx)
     return take_flag(r, &r->pause);
 }
 
-// --- the thread -----------------------------------------------------------------------------------
+// --- the thread
+// -----------------------------------------------------------------------------------
 
 static void run(struct runner *r)
 {
@@ -271,7 +275,8 @@ static void *thread_main(void *ctx)
     return NULL;
 }
 
-int runner_start(const struct runner_links *links, struct runner **ret_runner, struct gon_error *err)
+int runner_start(const struct runner_links *links, struct runner **ret_runner,
+                 struct gon_error *err)
 {
     struct runner *r = calloc(1, sizeof *r);
     if (!r)

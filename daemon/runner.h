@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The instrument thread: it alone owns the bench. It runs queued campaigns (engine_run); while it has none
-// it asks each device once a second how it is and brings back those that were lost. It tells the main
-// thread what happens and waits for the store's acknowledgements, keeping the laser's lease meanwhile.
+// The instrument thread: it alone owns the bench. It runs queued campaigns (engine_run); while it
+// has none it asks each device once a second how it is and brings back those that were lost. It
+// tells the main thread what happens and waits for the store's acknowledgements, keeping the
+// laser's lease meanwhile.
 #pragma once
 #include "base/err.h"
 
@@ -18,5 +19,6 @@ struct runner_links {
     struct mail *to_main, *to_store;
 };
 
-int runner_start(const struct runner_links *links, struct runner **ret_runner, struct gon_error *err);
+int runner_start(const struct runner_links *links, struct runner **ret_runner,
+                 struct gon_error *err);
 void runner_join(struct runner *r); // after NOTE_QUIT; NULL is fine

@@ -55,9 +55,11 @@ static void find_program(char *ret_path, size_t size)
 static int make_folder(struct simulator *s, struct gon_error *err)
 {
     const char *runtime = getenv("XDG_RUNTIME_DIR");
-    snprintf(s->folder, sizeof s->folder, "%s/goniosim-XXXXXX", runtime && *runtime ? runtime : "/tmp");
+    snprintf(s->folder, sizeof s->folder, "%s/goniosim-XXXXXX",
+             runtime && *runtime ? runtime : "/tmp");
     if (!mkdtemp(s->folder)) {
-        int rc = gon_fail(err, GON_E_SYSTEM, "simulator: folder %s: %s", s->folder, strerror(errno));
+        int rc =
+            gon_fail(err, GON_E_SYSTEM, "simulator: folder %s: %s", s->folder, strerror(errno));
         *s->folder = 0;
         return rc;
     }
@@ -65,7 +67,8 @@ static int make_folder(struct simulator *s, struct gon_error *err)
     return GON_OK;
 }
 
-// Its own session: Ctrl-C at the terminal is for the daemon, which needs the laser to answer once more.
+// Its own session: Ctrl-C at the terminal is for the daemon, which needs the laser to answer once
+// more.
 static int spawn(struct simulator *s, char **argv, int out_fd, struct gon_error *err)
 {
     posix_spawnattr_t attributes;
@@ -74,7 +77,8 @@ static int spawn(struct simulator *s, char **argv, int out_fd, struct gon_error 
     sigemptyset(&none);
     sigfillset(&all);
     posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    posix_spawnattr_setflags(&attributes,
+                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     posix_spawnattr_setsigmask(&attributes, &none);
     posix_spawnattr_setsigdefault(&attributes, &all);
     posix_spawn_file_actions_init(&actions);
@@ -86,14 +90,18 @@ static int spawn(struct simulator *s, char **argv, int out_fd, struct gon_error 
     if (rc == 0)
         return GON_OK;
     s->pid = 0;
-    return gon_fail(err, GON_E_INPUT, "simulator: %s does not start: %s; build it with make, or give a bench with --config",
-                    argv[0], strerror(rc));
+    return gon_fail(
+        err, GON_E_INPUT,
+        "simulator: %s does not start: %s; build it with make, or give a bench with --config",
+        argv[0], strerror(rc));
 }
 
-static int start_process(struct simulator *s, const struct simulator_options *options, struct gon_error *err)
+static int start_process(struct simulator *s, const struct simulator_options *options,
+                         struct gon_error *err)
 {
     char program[PATH_MAX], seed[32];
-    char *argv[MOST_ARGUMENTS] = {program, (char *)"--run-dir", s->folder, (char *)"--exit-with-parent"};
+    char *argv[MOST_ARGUMENTS] = {program, (char *)"--run-dir", s->folder,
+                                  (char *)"--exit-with-parent"};
     int argc = 4, ends[2];
     find_program(program, sizeof program);
     if (options->fast)
@@ -123,12 +131,15 @@ static int wait_ready(struct simulator *s, struct gon_error *err)
         int64_t left_ns = end_ns - clk_now_ns(clk_system());
         struct pollfd p = {s->out_fd, POLLIN, 0};
         if (left_ns <= 0 || size == sizeof text - 1)
-            return gon_fail(err, GON_E_SYSTEM, "simulator: goniosim was not ready within %d s", READY_S);
+            return gon_fail(err, GON_E_SYSTEM, "simulator: goniosim was not ready within %d s",
+                            READY_S);
         if (poll(&p, 1, (int)(left_ns / 1000000) + 1) <= 0)
             continue;
         ssize_t n = read(s->out_fd, text + size, sizeof text - 1 - size);
         if (n <= 0)
-            return gon_fail(err, GON_E_SYSTEM, "simulator: goniosim ended before it was ready; try: goniosim --run-dir DIR");
+            return gon_fail(
+                err, GON_E_SYSTEM,
+                "simulator: goniosim ended before it was ready; try: goniosim --run-dir DIR");
         size += (size_t)n;
         text[size] = 0;
         if (!strncmp(text, "ready", 5) || strstr(text, "\nready"))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The simulated bench of `goniod --sim`: a goniosim process with a private run directory, which ends with
-// the daemon, however that ends. Thread: main; a few calls that block are made before and after the loop.
+// The simulated bench of `goniod --sim`: a goniosim process with a private run directory, which
+// ends with the daemon, however that ends. Thread: main; a few calls that block are made before and
+// after the loop.
 #pragma once
 #include "base/err.h"
 
@@ -13,7 +14,8 @@ struct simulator_options {
     long seed; // -1: goniosim's own default
 };
 
-// Starts goniosim (beside this program, in ../bin, or on PATH) and waits until it says that it is ready.
+// Starts goniosim (beside this program, in ../bin, or on PATH) and waits until it says that it is
+// ready.
 int simulator_start(const struct simulator_options *options, struct simulator **ret_simulator,
                     struct gon_error *err);
 void simulator_stop(struct simulator *s); // and removes its run directory

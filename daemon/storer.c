@@ -52,7 +52,8 @@ static int64_t utc_ms(const struct storer *s)
     return clk_utc_ns(s->links.clk) / 1000000;
 }
 
-// --- which campaigns there are --------------------------------------------------------------------
+// --- which campaigns there are
+// --------------------------------------------------------------------
 
 static enum run_state state_of(const char *name)
 {
@@ -69,8 +70,14 @@ static struct run *run_of(const struct catalog_entry *e)
     if (!run)
         return NULL;
     const double unknown = (double)NAN;
-    *run = (struct run){.id = e->id, .state = state_of(e->state), .done = e->done, .total = e->total,
-                        .theta_i_deg = unknown, .theta_r_deg = unknown, .f_per_sr = unknown, .u_per_sr = unknown,
+    *run = (struct run){.id = e->id,
+                        .state = state_of(e->state),
+                        .done = e->done,
+                        .total = e->total,
+                        .theta_i_deg = unknown,
+                        .theta_r_deg = unknown,
+                        .f_per_sr = unknown,
+                        .u_per_sr = unknown,
                         .left_s = unknown};
     snprintf(run->path, sizeof run->path, "%s", e->path);
     snprintf(run->name, sizeof run->name, "%s", e->name);
@@ -97,7 +104,8 @@ static void list(struct storer *s)
     note_post(s->links.to_main, end);
 }
 
-// --- a new campaign -------------------------------------------------------------------------------
+// --- a new campaign
+// -------------------------------------------------------------------------------
 
 static void add_line(void *ctx, const char *line)
 {
@@ -117,7 +125,8 @@ static int create_file(struct storer *s, const struct campaign_config *config, c
     int id, rc = plan_make(config, s->links.bench, &plan, err);
     if (rc < 0)
         return rc;
-    struct store_new what = {config, n->text, n->name, s->links.bench, s->links.bench_text, &plan, utc_ms(s)};
+    struct store_new what = {config, n->text,  n->name, s->links.bench, s->links.bench_text,
+                             &plan,  utc_ms(s)};
     rc = catalog_create(s->links.directory, &what, &store, &id, err);
     if (rc == 0)
         snprintf(ret_path, size, "%s", store_path(store));
@@ -126,8 +135,8 @@ static int create_file(struct storer *s, const struct campaign_config *config, c
     return rc;
 }
 
-static void answer_known(struct storer *s, const struct note *question, int rc, const struct gon_error *err,
-                         const char *path, char *complaints)
+static void answer_known(struct storer *s, const struct note *question, int rc,
+                         const struct gon_error *err, const char *path, char *complaints)
 {
     struct catalog_entry e;
     struct note *n = note_new(NOTE_KNOWN);
@@ -147,7 +156,8 @@ static void create(struct storer *s, const struct note *n)
     struct campaign_config config;
     char path[CATALOG_PATH] = "", *complaints = NULL;
     struct gon_error err = {GON_E_INPUT, "the campaign is wrong"};
-    int rc = campaign_config_parse(n->text, n->name, (struct cfg_sink){add_line, &complaints}, &config);
+    int rc =
+        campaign_config_parse(n->text, n->name, (struct cfg_sink){add_line, &complaints}, &config);
     if (rc == 0)
         rc = create_file(s, &config, n, path, sizeof path, &err);
     answer_known(s, n, rc, &err, path, complaints);
@@ -161,43 +171,55 @@ static void look(struct storer *s, const struct note *n)
     int rc = catalog_resolve(s->links.directory, n->name, path, sizeof path, &err);
     if (rc == 0) {
         snprintf(folder, sizeof folder, "%s", path);
-        char *slash = strrchr(folder, '/'), *real = NULL, *ours = realpath(s->links.directory, NULL);
+        char *slash = strrchr(folder, '/'), *real = NULL,
+             *ours = realpath(s->links.directory, NULL);
         if (slash)
             *slash = 0;
         real = realpath(slash ? folder : ".", NULL);
         if (!real || !ours || strcmp(real, ours))
-            rc = gon_fail(&err, GON_E_INPUT, "%s is not in the daemon's folder; copy it to %s first", path,
-                          s->links.directory);
+            rc =
+                gon_fail(&err, GON_E_INPUT, "%s is not in the daemon's folder; copy it to %s first",
+                         path, s->links.directory);
         free(real);
         free(ours);
     }
     answer_known(s, n, rc, &err, path, NULL);
 }
 
-// --- the campaign that is measured ----------------------------------------------------------------
+// --- the campaign that is measured
+// ----------------------------------------------------------------
 
-static int same_number(const char *what, double then, double now, const char *unit, struct gon_error *err)
+static int same_number(const char *what, double then, double now, const char *unit,
+                       struct gon_error *err)
 {
     if (then == now)
         return GON_OK;
-    return gon_fail(err, GON_E_REFUSED,
-                    "the campaign was begun on another bench: %s %g %s then, %g now; go on with that bench", what,
-                    then, unit, now);
+    return gon_fail(
+        err, GON_E_REFUSED,
+        "the campaign was begun on another bench: %s %g %s then, %g now; go on with that bench",
+        what, then, unit, now);
 }
 
 // Links, names and speeds may change between two days of a campaign; what its numbers mean may not.
-static int same_bench(const struct bench_config *then, const struct bench_config *now, struct gon_error *err)
+static int same_bench(const struct bench_config *then, const struct bench_config *now,
+                      struct gon_error *err)
 {
     int rc = same_number("wavelength", then->wavelength_nm, now->wavelength_nm, "nm", err);
-    rc = rc < 0 ? rc : same_number("aperture radius", then->aperture_radius_mm, now->aperture_radius_mm, "mm", err);
+    rc = rc < 0 ? rc
+                : same_number("aperture radius", then->aperture_radius_mm, now->aperture_radius_mm,
+                              "mm", err);
     rc = rc < 0 ? rc : same_number("distance", then->distance_mm, now->distance_mm, "mm", err);
-    rc = rc < 0 ? rc : same_number("laser power", then->laser.power_w, now->laser.power_w, "W", err);
+    rc =
+        rc < 0 ? rc : same_number("laser power", then->laser.power_w, now->laser.power_w, "W", err);
     if (rc == 0 && then->regime != now->regime)
-        rc = gon_fail(err, GON_E_REFUSED, "the campaign was begun in the other regime; go on with that bench");
+        rc = gon_fail(err, GON_E_REFUSED,
+                      "the campaign was begun in the other regime; go on with that bench");
     if (rc == 0 && then->laser.polarisation != now->laser.polarisation)
-        rc = gon_fail(err, GON_E_REFUSED, "the campaign was begun with polarisation %s, the bench has %s; go on with that bench",
-                      polarisation_name((enum polarisation)then->laser.polarisation),
-                      polarisation_name((enum polarisation)now->laser.polarisation));
+        rc = gon_fail(
+            err, GON_E_REFUSED,
+            "the campaign was begun with polarisation %s, the bench has %s; go on with that bench",
+            polarisation_name((enum polarisation)then->laser.polarisation),
+            polarisation_name((enum polarisation)now->laser.polarisation));
     return rc;
 }
 
@@ -208,7 +230,8 @@ static int read_opening(struct store *store, struct run_material *m, struct gon_
     if (count < 0)
         return count;
     struct reduce_reference r = reduce_opening(&m->plan, rows, count);
-    m->opening = (struct engine_opening){r.dark_signal_v, r.dark_monitor_v, r.beam_signal_v, r.beam_monitor_v};
+    m->opening = (struct engine_opening){r.dark_signal_v, r.dark_monitor_v, r.beam_signal_v,
+                                         r.beam_monitor_v};
     m->has_opening = count > 0;
     free(rows);
     return GON_OK;
@@ -279,7 +302,8 @@ static void append_fit(struct storer *s, const struct note *n)
     answer->sweep = n->sweep;
     answer->last = n->last;
     int rc = s->store && n->run == s->run
-                 ? store_append_reduction(s->store, utc_ms(s), &o->reduction, &o->record.reduction, &answer->err)
+                 ? store_append_reduction(s->store, utc_ms(s), &o->reduction, &o->record.reduction,
+                                          &answer->err)
                  : gon_fail(&answer->err, GON_E_STORE, "store: run %d has no open file", n->run);
     if (rc == 0)
         rc = store_append_fit(s->store, utc_ms(s), &o->record, &id, &answer->err);
@@ -296,7 +320,8 @@ static void close_run(struct storer *s, const struct note *n)
     answer->run = n->run;
     if (append_state(s, n, &answer->err) == 0)
         answer->err.code = GON_OK;
-    store_close(s->store, NULL); // a checkpoint that failed loses nothing: the next opening makes it
+    store_close(s->store,
+                NULL); // a checkpoint that failed loses nothing: the next opening makes it
     s->store = NULL;
     s->run = 0;
     note_post(s->links.to_main, answer);
@@ -312,7 +337,8 @@ void storer_step(struct storer *s, struct note *n)
     case NOTE_READING: append_reading(s, n); break;
     case NOTE_EVENT:
         if (s->store && n->run == s->run)
-            store_append_event(s->store, utc_ms(s), n->level, n->source, n->text ? n->text : "", NULL);
+            store_append_event(s->store, utc_ms(s), n->level, n->source, n->text ? n->text : "",
+                               NULL);
         break;
     case NOTE_STATE: append_state(s, n, NULL); break;
     case NOTE_FIT: append_fit(s, n); break;
@@ -322,7 +348,8 @@ void storer_step(struct storer *s, struct note *n)
     note_free(n);
 }
 
-// --- the thread -----------------------------------------------------------------------------------
+// --- the thread
+// -----------------------------------------------------------------------------------
 
 static void *thread_main(void *ctx)
 {
@@ -336,7 +363,8 @@ static void *thread_main(void *ctx)
     return NULL;
 }
 
-int storer_start(const struct storer_links *links, struct storer **ret_storer, struct gon_error *err)
+int storer_start(const struct storer_links *links, struct storer **ret_storer,
+                 struct gon_error *err)
 {
     struct storer *s = storer_new(links);
     if (!s)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The store thread: the only one that writes campaign files. A core that is stepped by notes (storer_step)
-// and a thread around it. It has at most one file open for writing; each reading is acknowledged to the
-// instrument thread once it is committed, and a row that is offered again after an answer was lost is
-// acknowledged again when it is the same.
+// The store thread: the only one that writes campaign files. A core that is stepped by notes
+// (storer_step) and a thread around it. It has at most one file open for writing; each reading is
+// acknowledged to the instrument thread once it is committed, and a row that is offered again after
+// an answer was lost is acknowledged again when it is the same.
 #pragma once
 #include "base/err.h"
 
@@ -22,8 +22,9 @@ struct storer_links { // all borrowed for the storer's life
 };
 
 struct storer *storer_new(const struct storer_links *links); // the core; NULL without memory
-void storer_step(struct storer *s, struct note *n);          // takes the note; answers go to the mailboxes
+void storer_step(struct storer *s, struct note *n); // takes the note; answers go to the mailboxes
 void storer_free(struct storer *s);                          // closes what is open; NULL is fine
 
-int storer_start(const struct storer_links *links, struct storer **ret_storer, struct gon_error *err);
+int storer_start(const struct storer_links *links, struct storer **ret_storer,
+                 struct gon_error *err);
 void storer_join(struct storer *s); // after NOTE_QUIT; frees it; NULL is fine

@@ -9,13 +9,15 @@
 
 enum { BLOCK_BYTES = 16 * 1024 };
 
-struct stream *stream_new(struct MHD_Connection *connection, const struct events *events, uint64_t seen)
+struct stream *stream_new(struct MHD_Connection *connection, const struct events *events,
+                          uint64_t seen)
 {
     struct stream *s = calloc(1, sizeof *s);
     if (!s)
         return NULL;
     *s = (struct stream){.connection = connection, .events = events, .seen = seen};
-    s->text = strdup(": events of goniod\nretry: 1000\n\n"); // also tells the client that it is connected
+    s->text =
+        strdup(": events of goniod\nretry: 1000\n\n"); // also tells the client that it is connected
     s->size = s->text ? strlen(s->text) : 0;
     return s;
 }
@@ -42,7 +44,8 @@ static bool take_lost(struct stream *s, uint64_t first, uint64_t last)
 {
     char *text;
     int n = asprintf(&text,
-                     "event: lost\ndata: {\"event\":\"lost\",\"first\":%" PRIu64 ",\"last\":%" PRIu64 "}\n\n",
+                     "event: lost\ndata: {\"event\":\"lost\",\"first\":%" PRIu64
+                     ",\"last\":%" PRIu64 "}\n\n",
                      first, last);
     s->seen = last;
     return n >= 0 && take_text(s, text, (size_t)n);

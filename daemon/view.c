@@ -14,10 +14,11 @@ json_t *view_number(double value)
 
 json_t *view_run(const struct run *run, bool with_fit)
 {
-    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id, "name",
-                          run->name, "sample", run->sample, "file", run->path, "state",
-                          run_state_name(run->state), "text", run->text, "sweep", run->sweep, "sweeps",
-                          run->sweeps, "done", run->done, "total", run->total, "emission", run->emission);
+    json_t *o =
+        json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id, "name",
+                  run->name, "sample", run->sample, "file", run->path, "state",
+                  run_state_name(run->state), "text", run->text, "sweep", run->sweep, "sweeps",
+                  run->sweeps, "done", run->done, "total", run->total, "emission", run->emission);
     json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
     json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
     json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));
@@ -82,9 +83,9 @@ json_t *view_devices(const struct instrument_snapshot *s)
         if (p->link == PART_ABSENT)
             continue;
         json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name, "link",
-                              p->link == PART_OK ? "ok" : "lost", "address", p->address, "identity", p->identity,
-                              "problem", p->problem, "errors", (json_int_t)p->errors, "returns",
-                              (json_int_t)p->returns);
+                              p->link == PART_OK ? "ok" : "lost", "address", p->address, "identity",
+                              p->identity, "problem", p->problem, "errors", (json_int_t)p->errors,
+                              "returns", (json_int_t)p->returns);
         if (i < INSTRUMENT_AXES)
             add_axis(o, s, i);
         else if (i == PART_LASER)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the daemon knows, as JSON: the resources of /api/v1 and the events of its stream share these. A
-// number that is not known is null. The caller owns what is returned; NULL without memory.
+// What the daemon knows, as JSON: the resources of /api/v1 and the events of its stream share
+// these. A number that is not known is null. The caller owns what is returned; NULL without memory.
 #pragma once
 #include "daemon/instrument.h"
 #include "daemon/queue.h"
@@ -9,11 +9,13 @@
 
 json_t *view_number(double value); // null unless finite
 
-// {"run", "name", "sample", "file", "state", "text", "sweep", "sweeps", "done", "total", "theta_i_deg",
-//  "theta_r_deg", "f_r_per_sr", "u_f_r_per_sr", "flags", "left_s", "emission"}; with_fit adds "fit".
+// {"run", "name", "sample", "file", "state", "text", "sweep", "sweeps", "done", "total",
+//  "theta_i_deg", "theta_r_deg", "f_r_per_sr", "u_f_r_per_sr", "flags", "left_s", "emission"};
+// with_fit adds "fit".
 json_t *view_run(const struct run *run, bool with_fit);
 
-// [{"name", "link", "address", "identity", "problem", "errors", "returns", then what belongs to it}]
+// [{"name", "link", "address", "identity", "problem", "errors", "returns", then what belongs to
+// it}]
 json_t *view_devices(const struct instrument_snapshot *s);
 
 json_t *view_flags(unsigned flags); // ["saturated", ...]

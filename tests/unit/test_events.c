@@ -18,7 +18,8 @@ static void an_event_has_the_streams_syntax(void **state)
     assert_int_equal(events_add(e, "state", "{\"run\":1}"), 7);
     assert_int_equal(events_add(e, "log", "{}"), 8);
     assert_true(events_after(e, 0, &v));
-    assert_string_equal(v.text, "id: 7\nevent: state\ndata: {\"event\":\"state\",\"id\":7,\"run\":1}\n\n");
+    assert_string_equal(v.text,
+                        "id: 7\nevent: state\ndata: {\"event\":\"state\",\"id\":7,\"run\":1}\n\n");
     assert_int_equal(v.size, strlen(v.text));
     assert_true(events_after(e, 7, &v));
     assert_string_equal(v.text, "id: 8\nevent: log\ndata: {\"event\":\"log\",\"id\":8}\n\n");

@@ -71,7 +71,8 @@ static int set_up(void **state)
     assert_non_null(w->loop = loop_new(NULL));
     w->events = events_new(16, 100000, 1);
     struct http_ports ports = {w, request};
-    assert_non_null(w->http = http_new(w->loop, listener_fd(w->listener), w->events, &ports, NULL, NULL));
+    assert_non_null(w->http =
+                        http_new(w->loop, listener_fd(w->listener), w->events, &ports, NULL, NULL));
     assert_int_equal(loop_every(w->loop, 20000, give_up, w, NULL), 0);
     *state = w;
     return 0;
@@ -145,7 +146,9 @@ static void a_body_arrives_whole(void **state)
     struct world *w = *state;
     expect(w, "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\n\r\nhello", "200");
     assert_string_equal(w->body, "hello");
-    expect(w, "POST /x HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n2\r\nab\r\n1\r\nc\r\n0\r\n\r\n",
+    expect(w,
+           "POST /x HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: "
+           "chunked\r\n\r\n2\r\nab\r\n1\r\nc\r\n0\r\n\r\n",
            "200");
     assert_string_equal(w->body, "abc");
 }
@@ -154,17 +157,21 @@ static void ambiguous_lengths_are_refused(void **state)
 {
     struct world *w = *state;
     expect(w,
-           "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+           "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nTransfer-Encoding: "
+           "chunked\r\n\r\n0\r\n\r\n",
            "400");
-    expect(w, "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\nhello", "400");
+    expect(w, "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nContent-Length: 6\r\n\r\nhello",
+           "400");
 }
 
 static void large_bodies_are_refused(void **state)
 {
     struct world *w = *state;
-    expect(w, "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 1048577\r\n\r\n", "413"); // before it is sent
+    expect(w, "POST /x HTTP/1.1\r\nHost: a\r\nContent-Length: 1048577\r\n\r\n",
+           "413"); // before it is sent
     char *text = malloc(80000);
-    int n = sprintf(text, "POST /x HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n", 70000);
+    int n = sprintf(text, "POST /x HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n",
+                    70000);
     memset(text + n, 'x', 70000);
     strcpy(text + n + 70000, "\r\n0\r\n\r\n");
     expect(w, text, "413");

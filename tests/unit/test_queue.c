@@ -69,7 +69,8 @@ static void changed(void *ctx, const struct run *run)
 
 static struct queue *make(int runs)
 {
-    struct queue_ports ports = {NULL, open_run, start_run, fit_run_, close_run, cancel, rearm, changed};
+    struct queue_ports ports = {NULL,      open_run, start_run, fit_run_,
+                                close_run, cancel,   rearm,     changed};
     struct queue *q = queue_new(&ports);
     for (int id = runs; id >= 1; id--)
         queue_know(q, &(struct run){.id = id, .state = RUN_STOPPED, .left_s = (double)NAN});
@@ -81,7 +82,8 @@ static struct queue *make(int runs)
 
 static void event(struct queue *q, int id, enum run_state state, const char *text)
 {
-    queue_engine_event(q, id, &(struct engine_event){.kind = ENGINE_STATE, .state = state, .text = text});
+    queue_engine_event(q, id,
+                       &(struct engine_event){.kind = ENGINE_STATE, .state = state, .text = text});
 }
 
 static void measure(struct queue *q, int id)

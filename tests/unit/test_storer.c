@@ -29,22 +29,30 @@
 #include <unistd.h>
 
 static const char bench_text[] =
-    "bench: { name = \"test\"; wavelength_nm = 1060.0; regime = \"underfilled\"; aperture_radius_mm = 8.0;\n"
+    "bench: { name = \"test\"; wavelength_nm = 1060.0; regime = \"underfilled\"; "
+    "aperture_radius_mm = 8.0;\n"
     "  u_aperture_radius_mm = 0.004; distance_mm = 500.0; u_distance_mm = 0.25; };\n"
     "buses: ( { name = \"axes\"; link = \"modbus-tcp:127.0.0.1:502\"; } );\n"
-    "axes: ( { name = \"theta_i\"; driver = \"oriental-az\"; bus = \"axes\"; unit = 1; unit_name = \"deg\";\n"
-    "    steps_per_unit = 1000.0; min = -5.0; max = 88.0; speed = 20.0; acceleration = 60.0; deadband = 0.003; },\n"
-    "  { name = \"theta_r\"; driver = \"oriental-az\"; bus = \"axes\"; unit = 2; unit_name = \"deg\";\n"
+    "axes: ( { name = \"theta_i\"; driver = \"oriental-az\"; bus = \"axes\"; unit = 1; unit_name = "
+    "\"deg\";\n"
+    "    steps_per_unit = 1000.0; min = -5.0; max = 88.0; speed = 20.0; acceleration = 60.0; "
+    "deadband = 0.003; },\n"
+    "  { name = \"theta_r\"; driver = \"oriental-az\"; bus = \"axes\"; unit = 2; unit_name = "
+    "\"deg\";\n"
     "    steps_per_unit = 1000.0; min = -180.0; max = 180.0; speed = 20.0; acceleration = 60.0;\n"
     "    deadband = 0.003; } );\n"
-    "laser: { driver = \"cobolt-05\"; link = \"tcp:127.0.0.1:5000\"; power_w = 0.05; warmup_s = 1.0;\n"
+    "laser: { driver = \"cobolt-05\"; link = \"tcp:127.0.0.1:5000\"; power_w = 0.05; warmup_s = "
+    "1.0;\n"
     "  polarisation = \"u\"; };\n"
-    "detector: { driver = \"sr830\"; link = \"tcp:127.0.0.1:5001\"; time_constant_s = 0.001; slope_db = 12;\n"
+    "detector: { driver = \"sr830\"; link = \"tcp:127.0.0.1:5001\"; time_constant_s = 0.001; "
+    "slope_db = 12;\n"
     "  monitor_aux = 1; };\n"
-    "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; sample_mm = 0.0; } );\n";
+    "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; sample_mm = 0.0; } "
+    ");\n";
 
-static const char campaign_text[] = "campaign: { name = \"Core test\"; theta_i_deg = [ 0.0, 30.0, 50.0 ];\n"
-                                    "  theta_r: { from_deg = -60.0; to_deg = 60.0; step_deg = 5.0; }; };\n";
+static const char campaign_text[] =
+    "campaign: { name = \"Core test\"; theta_i_deg = [ 0.0, 30.0, 50.0 ];\n"
+    "  theta_r: { from_deg = -60.0; to_deg = 60.0; step_deg = 5.0; }; };\n";
 
 static const struct brdf_params truth = {1.5, 0.02, 0.15, 0.9, 0.05};
 
@@ -70,13 +78,19 @@ static int set_up(void **state)
     struct world *w = calloc(1, sizeof *w);
     strcpy(w->folder, "/tmp/gonio-store-XXXXXX");
     assert_non_null(mkdtemp(w->folder));
-    assert_int_equal(bench_config_parse(bench_text, "bench", (struct cfg_sink){say, NULL}, &w->bench), 0);
+    assert_int_equal(
+        bench_config_parse(bench_text, "bench", (struct cfg_sink){say, NULL}, &w->bench), 0);
     w->cancel = cancel_new();
     w->to_main = mail_new();
     w->to_runner = mail_new();
     w->to_store = mail_new();
-    w->links = (struct storer_links){clk_virtual_init(&w->clk, 0, CLK_S(1.8e9)), &w->bench, bench_text, w->folder,
-                                     w->to_store, w->to_main, w->to_runner};
+    w->links = (struct storer_links){clk_virtual_init(&w->clk, 0, CLK_S(1.8e9)),
+                                     &w->bench,
+                                     bench_text,
+                                     w->folder,
+                                     w->to_store,
+                                     w->to_main,
+                                     w->to_runner};
     w->storer = storer_new(&w->links);
     struct fitter_links f = {w->cancel, NULL, w->to_main, w->to_store};
     w->fitter = fitter_new(&f);
@@ -154,11 +168,18 @@ static void close_run(struct world *w, int run, enum run_state as)
 // What a bench without noise would read.
 static struct store_reading reading_of(const struct plan_point *p, const struct bench_config *bench)
 {
-    struct store_reading r = {.sweep = p->sweep, .point = p->point, .attempt = 1, .t_utc_ms = 1800000000000,
+    struct store_reading r = {.sweep = p->sweep,
+                              .point = p->point,
+                              .attempt = 1,
+                              .t_utc_ms = 1800000000000,
                               .theta_i_udeg = (int32_t)units_udeg(p->theta_i_deg),
-                              .theta_r_udeg = (int32_t)units_udeg(p->theta_r_deg), .signal_sd_v = 1e-7,
-                              .monitor_v = 2.0, .monitor_sd_v = 1e-4, .count = 4};
-    double dphi_rad = p->theta_r_deg >= 0 ? UNITS_PI : 0, theta_r_rad = units_rad(fabs(p->theta_r_deg));
+                              .theta_r_udeg = (int32_t)units_udeg(p->theta_r_deg),
+                              .signal_sd_v = 1e-7,
+                              .monitor_v = 2.0,
+                              .monitor_sd_v = 1e-4,
+                              .count = 4};
+    double dphi_rad = p->theta_r_deg >= 0 ? UNITS_PI : 0,
+           theta_r_rad = units_rad(fabs(p->theta_r_deg));
     if (p->kind == PLAN_DARK) {
         r.signal_v = 1e-6;
         r.monitor_v = 0.002;
@@ -239,8 +260,9 @@ static void a_row_offered_again_is_accepted_only_when_it_is_the_same(void **stat
 static void a_wrong_campaign_is_complained_of_line_by_line(void **state)
 {
     struct world *w = *state;
-    storer_step(w->storer, note_of(NOTE_CREATE, 0, "x.cfg",
-                                   "campaign: {\n name = \"x\";\n theta_i_deg = [ 95.0 ];\n stpe = 1;\n};\n"));
+    storer_step(w->storer,
+                note_of(NOTE_CREATE, 0, "x.cfg",
+                        "campaign: {\n name = \"x\";\n theta_i_deg = [ 95.0 ];\n stpe = 1;\n};\n"));
     struct note *n = expect(w->to_main, NOTE_KNOWN);
     assert_null(n->thing);
     assert_int_equal(n->err.code, GON_E_INPUT);
