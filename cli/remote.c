@@ -168,8 +168,7 @@ const struct verb verb_status = {
     rows,
     run_status};
 
-// --- stop, pause, resume
-// --------------------------------------------------------------------------
+// --- stop, pause, resume -------------------------------------------------------------------------
 
 static int command(const struct verb *verb, int argc, char **argv, const char *path,
                    json_t **ret_reply)

@@ -117,8 +117,7 @@ const struct verb verb_watch = {
     "Shows the progress of the active run until its end. Ctrl-C stops watching; the run goes on.\n",
     watch_rows, run_watch};
 
-// --- resume
-// ---------------------------------------------------------------------------------------
+// --- resume --------------------------------------------------------------------------------------
 
 // The run's number when the text is one, else the file's path as the daemon will need it.
 static json_t *what_to_resume(const char *text)

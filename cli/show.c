@@ -69,8 +69,7 @@ static json_t *number(double v)
     return isfinite(v) ? json_real(v) : json_null();
 }
 
-// --- one sweep
-// ------------------------------------------------------------------------------------
+// --- one sweep -----------------------------------------------------------------------------------
 
 static const struct reduced_point *reduced(const struct campaign *c, const struct store_reading *r)
 {
@@ -174,8 +173,7 @@ static int show_sweep(struct campaign *c, const struct options *o)
     return EXIT_OK;
 }
 
-// --- the whole campaign
-// ---------------------------------------------------------------------------
+// --- the whole campaign --------------------------------------------------------------------------
 
 struct events {
     json_t *list;

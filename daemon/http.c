@@ -106,8 +106,7 @@ static struct http_reply check_header(struct http *h, struct MHD_Connection *c)
     if (size && size->header_size > MOST_HEADER)
         return refuse(431, "the request's header is larger than 8 KiB",
                       "send fewer or shorter header lines");
-    if (f.length >
-        MOST_SWALLOWED) // less is read to its end, so that the client is there for the answer
+    if (f.length > MOST_SWALLOWED) // less is read to its end: the client is there for the answer
         return refuse(413, "the request's body is larger than 64 KiB", "send a smaller one");
     return (struct http_reply){0};
 }

@@ -38,8 +38,7 @@ struct hub {
     bool ready_said, listed, ending, ended_said;
 };
 
-// --- what is told to those who watch
-// --------------------------------------------------------------
+// --- what is told to those who watch -------------------------------------------------------------
 
 static void publish(struct hub *h, const char *kind, json_t *data)
 {
@@ -140,8 +139,7 @@ static void fitted(struct hub *h, const struct note *n)
     queue_fitted(h->queue, n->run, fit ? n->text : NULL, &n->err);
 }
 
-// --- what the queue asks for
-// ----------------------------------------------------------------------
+// --- what the queue asks for ---------------------------------------------------------------------
 
 static struct note *about(enum note_kind kind, const struct run *run)
 {
@@ -197,8 +195,7 @@ static void rearm_port(void *ctx)
         cancel_reset(h->cancel); // no worker is at work: none can miss it
 }
 
-// --- requests
-// -------------------------------------------------------------------------------------
+// --- requests ------------------------------------------------------------------------------------
 
 uint64_t hub_event_id(const struct hub *h)
 {
@@ -293,8 +290,7 @@ int hub_resume(struct hub *h, struct gon_error *err)
     return to_active(h, NOTE_RESUME, true, err);
 }
 
-// --- what the workers say
-// -------------------------------------------------------------------------
+// --- what the workers say ------------------------------------------------------------------------
 
 static void known(struct hub *h, struct note *n)
 {
@@ -391,8 +387,7 @@ static void mail_arrived(void *ctx)
     say_when_ended(h);
 }
 
-// --- beginning and end
-// ----------------------------------------------------------------------------
+// --- beginning and end ---------------------------------------------------------------------------
 
 static int start_workers(struct hub *h, struct gon_error *err)
 {

@@ -103,8 +103,7 @@ static void print_help(void)
            "command: gonio help\n");
 }
 
-// --- callbacks of the loop
-// ------------------------------------------------------------------------
+// --- callbacks of the loop -----------------------------------------------------------------------
 
 static void signaled(void *ctx, int signal)
 {
@@ -154,8 +153,7 @@ static void ready(void *ctx, const struct instrument_snapshot *s)
     fflush(stdout);
 }
 
-// --- beginning and end
-// ----------------------------------------------------------------------------
+// --- beginning and end ---------------------------------------------------------------------------
 
 // All threads inherit the mask: signals are for the loop's descriptor.
 static void block_signals(void)

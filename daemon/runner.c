@@ -35,8 +35,7 @@ struct runner {
     int64_t next_snapshot_ns; // not before every part was asked once
 };
 
-// --- what the others say
-// --------------------------------------------------------------------------
+// --- what the others say -------------------------------------------------------------------------
 
 static void take(struct runner *r, struct note *n)
 {
@@ -85,8 +84,7 @@ static void watch(void *ctx)
     send_snapshot(r);
 }
 
-// --- the engine's ports
-// ---------------------------------------------------------------------------
+// --- the engine's ports --------------------------------------------------------------------------
 
 static bool same_reading(const struct store_reading *a, const struct store_reading *b)
 {
@@ -193,8 +191,7 @@ static bool take_pause_port(void *ctx)
     return take_flag(r, &r->pause);
 }
 
-// --- the thread
-// -----------------------------------------------------------------------------------
+// --- the thread ----------------------------------------------------------------------------------
 
 static void run(struct runner *r)
 {

@@ -52,8 +52,7 @@ static int64_t utc_ms(const struct storer *s)
     return clk_utc_ns(s->links.clk) / 1000000;
 }
 
-// --- which campaigns there are
-// --------------------------------------------------------------------
+// --- which campaigns there are -------------------------------------------------------------------
 
 static enum run_state state_of(const char *name)
 {
@@ -104,8 +103,7 @@ static void list(struct storer *s)
     note_post(s->links.to_main, end);
 }
 
-// --- a new campaign
-// -------------------------------------------------------------------------------
+// --- a new campaign ------------------------------------------------------------------------------
 
 static void add_line(void *ctx, const char *line)
 {
@@ -186,8 +184,7 @@ static void look(struct storer *s, const struct note *n)
     answer_known(s, n, rc, &err, path, NULL);
 }
 
-// --- the campaign that is measured
-// ----------------------------------------------------------------
+// --- the campaign that is measured ---------------------------------------------------------------
 
 static int same_number(const char *what, double then, double now, const char *unit,
                        struct gon_error *err)
@@ -348,8 +345,7 @@ void storer_step(struct storer *s, struct note *n)
     note_free(n);
 }
 
-// --- the thread
-// -----------------------------------------------------------------------------------
+// --- the thread ----------------------------------------------------------------------------------
 
 static void *thread_main(void *ctx)
 {
