@@ -313,6 +313,8 @@ int dataset_from_store(struct store *s, const struct dataset_filter *filter,
     snprintf(d.source, sizeof d.source, "%s", store_path(s));
     if (rc >= 0)
         rc = take_points(&plan, &r, filter, &d, err);
+    if (rc >= 0)
+        reduction_warning(&r, d.note, sizeof d.note);
     plan_clear(&plan);
     if (rc < 0)
         dataset_clear(&d);

@@ -31,6 +31,7 @@ struct dataset {
     double u_scale;   // relative standard uncertainty common to all; 0 from a CSV
     size_t left_out;  // by the filter
     char source[512];
+    char note[200]; // what the numbers are not (reduction_warning); "" when there is nothing to say
 };
 
 struct dataset_filter dataset_filter_all(void);

@@ -83,7 +83,7 @@ static json_t *warnings(const struct fit_record *f)
             fit_warning_text(r, (enum fit_warning)bit, text, sizeof text) > 0)
             json_array_append_new(all, json_string(text));
     }
-    if (f->note && *f->note)
+    if (*f->note)
         json_array_append_new(all, json_string(f->note));
     return all;
 }

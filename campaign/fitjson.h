@@ -15,7 +15,7 @@ struct fit_record {
     struct fit_options options;
     struct fit_result result;
     const char *trace; // text, may be NULL
-    const char *note;  // one more warning (reduction_warning), may be NULL or ""
+    char note[200];    // one more warning, of the data set; "": none
 };
 
 // {"method","weights","points","seed","delta","params":{...},"derived":{...},"correlation":[...],

@@ -214,6 +214,7 @@ static int run_fit(const struct verb *verb, int argc, char **argv)
     rc = rc < 0 ? rc : set_options(&o, &record.options, &err);
     rc = rc < 0 ? rc : search(&data, &o, &record.options, &record.result, &err);
     record.points = data.count;
+    snprintf(record.note, sizeof record.note, "%s", data.note);
     int status = rc < 0 ? out_fail(&err) : print(&record, &data, o.json);
     dataset_clear(&data);
     return status;

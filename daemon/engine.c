@@ -49,10 +49,10 @@ const char *run_state_name(enum run_state s)
 
 static double seconds_left(const struct engine *e)
 {
-    const int here = e->done - e->first_done;
-    if (here < 3)
+    const int here = e->done - e->pace_done;
+    if (!e->pace_ns || here < 3)
         return (double)NAN;
-    const double s = (double)(clk_now_ns(e->ports->clk) - e->first_ns) * 1e-9;
+    const double s = (double)(clk_now_ns(e->ports->clk) - e->pace_ns) * 1e-9;
     return s / here * (e->plan->count - e->done);
 }
 
@@ -291,6 +291,15 @@ static void remember(struct engine *e, const struct acquire_reading *r)
     }
 }
 
+// Homing, warm-up and beam say nothing about how long a point takes.
+static void begin_pace(struct engine *e)
+{
+    if (e->pace_ns || e->point->kind != PLAN_SAMPLE)
+        return;
+    e->pace_ns = clk_now_ns(e->ports->clk);
+    e->pace_done = e->done;
+}
+
 static struct store_reading row_of(const struct engine *e, const struct acquire_reading *r,
                                    const struct travel_pose *at)
 {
@@ -324,6 +333,7 @@ static int prepare(struct engine *e)
     if (rc >= 0)
         rc = travel_home(e->in, e->ports->cancel, &e->why);
     e->ready = rc >= 0;
+    e->pace_ns = 0;
     instrument_permit(e->in, e->ready);
     e->acquire = (struct acquire){.range = -1};
     return rc;
@@ -401,6 +411,7 @@ static int measure(struct engine *e, const struct travel_pose *at)
         if (r.accepted) {
             remember(e, &r);
             e->done++;
+            begin_pace(e);
         }
         publish_reading(e, &r, at);
         if (r.accepted || !r.again)
@@ -525,7 +536,6 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .monitor_dark_v = (double)NAN,
         .monitor_lit_v = (double)NAN,
         .opening = {(double)NAN, (double)NAN, (double)NAN, (double)NAN},
-        .first_ns = clk_now_ns(ports->clk),
     };
     if (ports->opening) {
         e.opening = *ports->opening;
@@ -533,7 +543,6 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     }
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
-    e.first_done = e.done;
     enter(&e, RUN_PREPARING, NULL);
     return finish(&e, run_points(&e), err);
 }

@@ -26,8 +26,8 @@ struct engine {
 
     double omega_sr, monitor_dark_v, monitor_lit_v;
     struct engine_opening opening;
-    int64_t first_ns;
-    int first_done;
+    int64_t pace_ns; // when the sample's first point since the preparation was done; 0: none yet
+    int pace_done;   // points done then
     struct gon_error why; // of the last failure
 };
 

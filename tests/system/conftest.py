@@ -234,6 +234,13 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None):
                           env={**os.environ, "NO_COLOR": "", **(env or {})})
 
 
+def pytest_collection_modifyitems(items):
+    """The longest first, so that none of them is alone at the end."""
+    longest = ["test_paper_campaign", "test_kill", "test_unplug", "test_daemon"]
+    items.sort(key=lambda item: longest.index(item.module.__name__) if item.module.__name__ in longest
+               else len(longest))
+
+
 @pytest.fixture
 def start_daemon(tmp_path):
     """Starts daemons and ends them, whatever happens to the test."""

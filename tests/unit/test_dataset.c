@@ -374,6 +374,20 @@ static void an_analyser_is_not_fitted(void **state)
     fixture_remove(&folder);
 }
 
+static void polarised_light_is_said(void **state)
+{
+    (void)state;
+    const struct fixture_folder folder = fixture_folder();
+    const struct dataset_filter f = dataset_filter_all();
+    struct store *s = measured(&folder, "pol_in = \"s\";");
+    struct dataset d;
+    assert_int_equal(dataset_from_store(s, &f, &d, NULL, NULL), 0);
+    assert_non_null(strstr(d.note, "f_00 + m f_01"));
+    dataset_clear(&d);
+    store_close(s, NULL);
+    fixture_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -388,6 +402,7 @@ int main(void)
         cmocka_unit_test(measured_paints_are_read),
         cmocka_unit_test(a_campaign_becomes_a_data_set),
         cmocka_unit_test(an_analyser_is_not_fitted),
+        cmocka_unit_test(polarised_light_is_said),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }
