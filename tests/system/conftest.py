@@ -234,11 +234,24 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None):
                           env={**os.environ, "NO_COLOR": "", **(env or {})})
 
 
+LONGEST = ["test_paper_campaign", "test_kill", "test_unplug", "test_daemon"]
+
+
 def pytest_collection_modifyitems(items):
-    """The longest first, so that none of them is alone at the end."""
-    longest = ["test_paper_campaign", "test_kill", "test_unplug", "test_daemon"]
-    items.sort(key=lambda item: longest.index(item.module.__name__) if item.module.__name__ in longest
-               else len(longest))
+    """The longest first, one to a worker: xdist deals the first quarter in equal runs of consecutive tests, so the
+    tests that lead those runs are the long ones, and short ones wait behind them."""
+    rank = {name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.module.__name__, len(LONGEST)))
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    run = max(len(items) // (4 * workers), 2)
+    leaders, rest = items[:workers], items[workers:]
+    short = [item for item in rest if item.module.__name__ not in rank]
+    others = [item for item in rest if item.module.__name__ in rank]
+    dealt = []
+    for leader in leaders:
+        dealt += [leader, *short[:run - 1]]
+        del short[:run - 1]
+    items[:] = dealt + others + short
 
 
 @pytest.fixture
