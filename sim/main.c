@@ -15,7 +15,7 @@ enum { MOST_SETS = 64 };
 struct arguments {
     const char *run_dir, *config, *set;
     long seed;
-    bool fast, with_parent, help, version;
+    bool fast, with_parent, help, version, options, settings;
     char *sets[MOST_SETS];
     int set_count;
     pid_t parent; // 0: does not matter
@@ -35,6 +35,10 @@ static const struct option_row rows[] = {
      "end when the parent process ends"},
     {"--help", OPTION_FLAG, offsetof(struct arguments, help), NULL, 0, 0, "this text"},
     {"--version", OPTION_FLAG, offsetof(struct arguments, version), NULL, 0, 0, "name and version"},
+    {"--options", OPTION_FLAG, offsetof(struct arguments, options), NULL, 0, 0,
+     "this list for the manual page"},
+    {"--settings", OPTION_FLAG, offsetof(struct arguments, settings), NULL, 0, 0,
+     "the settings of sim.cfg for the manual page"},
     {0}};
 
 static int fail(const struct gon_error *err)
@@ -106,6 +110,25 @@ static int serve(struct arguments *a)
     return 0;
 }
 
+// What is only asked about the program. True when that was all.
+static bool describe(const struct arguments *a)
+{
+    if (a->help)
+        printf("goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and a control "
+               "socket\n");
+    if (a->help)
+        options_describe(stdout, rows);
+    else if (a->version)
+        printf("goniosim %s\n", GONIO_VERSION);
+    else if (a->options)
+        options_manual(stdout, rows);
+    else if (a->settings)
+        cfg_describe(stdout, sim_config_schema);
+    else
+        return false;
+    return true;
+}
+
 int main(int argc, char **argv)
 {
     struct gon_error err = {.text = ""};
@@ -115,14 +138,8 @@ int main(int argc, char **argv)
     int rc = argc < 0 ? argc : options_take(argc, argv, rows, &a, operands, 0, &err);
     if (rc < 0)
         return fail(&err);
-    if (a.help || a.version) {
-        printf(a.help ? "goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and "
-                        "a control socket\n"
-                      : "goniosim " GONIO_VERSION "\n");
-        if (a.help)
-            options_describe(stdout, rows);
+    if (describe(&a))
         return 0;
-    }
     if (!a.run_dir) {
         gon_fail(&err, GON_E_INPUT, "--run-dir DIR is missing; see --help");
         return fail(&err);
