@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Configuration: libconfig syntax, checked against a table. One row a setting: name, type, unit, range,
-// default, help; the parser, `gonio check` and the man pages all come from that table.
+// Configuration: libconfig syntax, checked against a table. One row a setting: name, type, unit,
+// range, default, help; the parser, `gonio check` and the man pages all come from that table.
 //
 // Every mistake is reported, not only the first, as
 //     file:line: path = value: what is wrong; allowed 0..85 deg
 //     file:line: unknown setting 'stpe' in campaign.theta_r; did you mean 'step_deg'?
 // and nothing is half-applied: the target is filled only when the whole file is right. Integers are
-// accepted for reals. '@include' is refused before parsing (it opens any path and hangs on a FIFO), as
-// is a path that is not a regular file or is larger than 1 MiB. Strings are UTF-8 and copied into the
-// target's arrays; a longer one is an error, never cut. Thread: any; a cfg_file belongs to its maker.
+// accepted for reals. '@include' is refused before parsing (it opens any path and hangs on a FIFO),
+// as is a path that is not a regular file or is larger than 1 MiB. Strings are UTF-8 and copied
+// into the target's arrays; a longer one is an error, never cut. Thread: any; a cfg_file belongs to
+// its maker.
 #pragma once
 #include <stddef.h>
 #include <stdio.h>
@@ -19,7 +20,8 @@ enum cfg_type {
     CFG_REAL,   // double
     CFG_BOOL,   // bool
     CFG_CHOICE, // int: index into choices
-    CFG_REALS,  // double[size], count at count_offset; [ ] or ( ) in the file, a single number is a list of one
+    CFG_REALS,  // double[size], count at count_offset; [ ] or ( ) in the file, a single number is a
+                // list of one
     CFG_GROUP,  // nested struct: { }
     CFG_GROUPS  // array of structs: ( { }, { } )
 };
@@ -27,16 +29,16 @@ enum cfg_type {
 struct cfg_row {
     const char *name;
     enum cfg_type type;
-    size_t offset;               // of the member in its struct
-    size_t size;                 // CFG_STRING bytes, CFG_REALS and CFG_GROUPS the most elements
-    const char *unit;            // "deg", "s", ... NULL: none
-    double min, max;             // inclusive; CFG_INT, CFG_REAL, CFG_REALS; equal: any
-    const char *fallback;        // default, as written in a file; NULL: must be given. CFG_GROUP: "" = may be left out
-    const char *help;            // one sentence
-    const char *const *choices;  // CFG_CHOICE, NULL at its end
-    const struct cfg_row *rows;  // CFG_GROUP, CFG_GROUPS; a row without name ends a table
-    size_t stride;               // CFG_GROUPS: sizeof one element
-    size_t count_offset;         // CFG_REALS, CFG_GROUPS: of the int that gets the count
+    size_t offset;        // of the member in its struct
+    size_t size;          // CFG_STRING bytes, CFG_REALS and CFG_GROUPS the most elements
+    const char *unit;     // "deg", "s", ... NULL: none
+    double min, max;      // inclusive; CFG_INT, CFG_REAL, CFG_REALS; equal: any
+    const char *fallback; // default, as written in a file; NULL: must be given; groups: "" or NULL
+    const char *help;     // one sentence
+    const char *const *choices; // CFG_CHOICE, NULL at its end
+    const struct cfg_row *rows; // CFG_GROUP, CFG_GROUPS; a row without name ends a table
+    size_t stride;              // CFG_GROUPS: sizeof one element
+    size_t count_offset;        // CFG_REALS, CFG_GROUPS: of the int that gets the count
 };
 
 // Who hears of mistakes: one call a line, without newline. NULL say: nobody.
@@ -47,7 +49,8 @@ struct cfg_sink {
 
 struct cfg_file; // a parsed file that remembers its lines
 
-// NULL when it cannot be read or parsed; the reason went to the sink, whose content must outlive the file.
+// NULL when it cannot be read or parsed; the reason went to the sink, whose content must outlive
+// the file.
 struct cfg_file *cfg_open(const char *path, struct cfg_sink sink);
 // The same from a text; name stands where the path would in messages.
 struct cfg_file *cfg_parse(const char *text, const char *name, struct cfg_sink sink);
@@ -62,7 +65,8 @@ int cfg_take(struct cfg_file *f, const struct cfg_row *schema, void *target);
 int cfg_complain(struct cfg_file *f, const char *path, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 
-const char *cfg_text(const struct cfg_file *f); // the file as it was read, for snapshots; until cfg_close
+// The file as it was read, for snapshots; until cfg_close.
+const char *cfg_text(const struct cfg_file *f);
 
 // Writes the table as scdoc (man page) text.
 void cfg_describe(FILE *out, const struct cfg_row *schema);

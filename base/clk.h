@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The injectable clock. Everything that waits or measures time does it through a struct clk, so that
-// the engine runs unchanged in virtual time. Deadlines are absolute, monotonic and in nanoseconds;
-// UTC is only ever stored, never compared.
+// The injectable clock. Everything that waits or measures time does it through a struct clk, so
+// that the engine runs unchanged in virtual time. Deadlines are absolute, monotonic and in
+// nanoseconds; UTC is only ever stored, never compared.
 #pragma once
 #include <stdint.h>
 
@@ -18,8 +18,8 @@ struct clk {
     const struct clk_ops *ops;
 };
 
-#define CLK_MS(ms) ((int64_t)((ms) * 1000000.0))
-#define CLK_S(s) ((int64_t)((s) * 1e9))
+#define CLK_MS(ms) ((int64_t)((ms)*1000000.0))
+#define CLK_S(s) ((int64_t)((s)*1e9))
 
 struct clk *clk_system(void); // the machine's clocks; stateless, never freed, any thread
 

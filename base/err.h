@@ -24,12 +24,13 @@ struct gon_error {
     char text[480]; // one line, no newline at its end, "" when nothing was said
 };
 
-// Fills err (NULL is fine) and returns code, so that a failure is one statement: return gon_fail(...).
+// Fills err (NULL is fine) and returns code, so that a failure is one statement: return
+// gon_fail(...).
 int gon_fail(struct gon_error *err, enum gon_code code, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 
-// Puts "who: " before the text that is there ("axis theta_r: no answer in 100 ms"); returns err's code,
-// or GON_E_SYSTEM when err is NULL. Text that no longer fits is cut at its end.
+// Puts "who: " before the text that is there ("axis theta_r: no answer in 100 ms"); returns err's
+// code, or GON_E_SYSTEM when err is NULL. Text that no longer fits is cut at its end.
 int gon_prefix(struct gon_error *err, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
 // "input", "link", "gone", ... for logs and JSON; "ok" for 0.

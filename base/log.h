@@ -9,7 +9,8 @@ enum log_level { LOG_ERR, LOG_WARN, LOG_NOTICE, LOG_INFO, LOG_DEBUG };
 
 struct log; // where lines go and which are kept
 
-// Writes to out (borrowed until log_free), with an ISO 8601 time when with_time. NULL without memory.
+// Writes to out (borrowed until log_free), with an ISO 8601 time when with_time. NULL without
+// memory.
 struct log *log_new(FILE *out, enum log_level most, int with_time);
 void log_free(struct log *log);
 

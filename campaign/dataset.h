@@ -3,8 +3,9 @@
 //
 // CSV: '#' lines are comments; the first other line names the columns. Needed: theta_i_deg;
 // theta_r_signed_deg (>= 0: forward, dphi = 180 deg) or theta_r_deg and dphi_deg; a value column,
-// f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in, pol_out. Other columns
-// are ignored. CRLF, a byte-order mark and rows that occur twice are fine. Errors are "file:line:
+// f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in,
+// pol_out. Other columns are ignored. CRLF, a byte-order mark and rows that occur twice are fine.
+// Errors are "file:line:
 // ...", GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged
 // row, theta outside [0, 90), a value column that is all zero, u_f_r <= 0, pol_in or pol_out
 // other than u.

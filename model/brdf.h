@@ -2,12 +2,13 @@
 // The polarised microfacet BRDF of Priest and Germer (2000) in the form of Feng et al., Acta Optica
 // Sinica 28(2), 290 (2008), with the paper's printed errors corrected (doc/manual.md lists them).
 //
-//   f_00 = ks/(2 pi) 1/(4 sigma^2) G/cos^4(theta) exp(-tan^2(theta)/(2 sigma^2)) / (cos theta_i cos theta_r)
-//          * (|rs(beta)|^2 + |rp(beta)|^2)/2  +  kd/cos theta_i                                   (eq. 16)
+//   f_00 = ks/(2 pi) 1/(4 sigma^2) G/cos^4(theta) exp(-tan^2(theta)/(2 sigma^2))
+//          / (cos theta_i cos theta_r) * (|rs(beta)|^2 + |rp(beta)|^2)/2
+//          + kd/cos theta_i                                                             (eq. 16)
 //
-// Angles in radians: theta_i, theta_r in [0, pi/2); dphi = phi_r - phi_i, pi is the specular half plane
-// (eq. 6). sigma is the rms slope per axis. BRDF in sr^-1. Outside its domain every function returns NAN.
-// Pure functions: any thread.
+// Angles in radians: theta_i, theta_r in [0, pi/2); dphi = phi_r - phi_i, pi is the specular half
+// plane (eq. 6). sigma is the rms slope per axis. BRDF in sr^-1. Outside its domain every function
+// returns NAN. Pure functions: any thread.
 #pragma once
 
 #define BRDF_INDEX_MAX 1e50 // of n and k: beyond it squares of squares overflow
@@ -27,22 +28,23 @@ enum brdf_diffuse {
 
 // One pair of directions, with all that does not depend on the parameters computed once.
 struct brdf_geometry {
-    double tan2_theta;   // of the facet's normal against the surface's
-    double sin2_beta;    // local angle of incidence on the facet
+    double tan2_theta; // of the facet's normal against the surface's
+    double sin2_beta;  // local angle of incidence on the facet
     double cos2_beta;
-    double spec_per_sr;  // A = G / (4 pi cos^4 theta cos theta_i cos theta_r)
-    double inv_cos_i;    // 1/cos theta_i
+    double spec_per_sr; // A = G / (4 pi cos^4 theta cos theta_i cos theta_r)
+    double inv_cos_i;   // 1/cos theta_i
 };
 
 // All members NAN outside the domain.
 struct brdf_geometry brdf_geometry(double theta_i_rad, double theta_r_rad, double dphi_rad);
 
-// (|rs|^2 + |rp|^2)/2 at local angle beta, in real arithmetic (no complex square root). Relative error
-// a few ulp also where it nearly vanishes (n near 1) and at total reflection (n < 1).
+// (|rs|^2 + |rp|^2)/2 at local angle beta, in real arithmetic (no complex square root). Relative
+// error a few ulp also where it nearly vanishes (n near 1) and at total reflection (n < 1).
 double brdf_fresnel_mean(double n, double k, double sin2_beta, double cos2_beta);
 
-double brdf_f00(const struct brdf_params *p, enum brdf_diffuse diffuse, const struct brdf_geometry *g);
+double brdf_f00(const struct brdf_params *p, enum brdf_diffuse diffuse,
+                const struct brdf_geometry *g);
 
-// Directional-hemispherical reflectance: f_00 cos theta_r over the hemisphere; absolute error < 1e-6
-// for sigma in [0.01, 0.6] and theta_i up to 89.9 deg. Some 0.1 ms (model/dhr.c).
+// Directional-hemispherical reflectance: f_00 cos theta_r over the hemisphere; absolute error <
+// 1e-6 for sigma in [0.01, 0.6] and theta_i up to 89.9 deg. Some 0.1 ms (model/dhr.c).
 double brdf_dhr(const struct brdf_params *p, enum brdf_diffuse diffuse, double theta_i_rad);

@@ -38,7 +38,8 @@ static void error_text_too_long_is_cut_not_overrun(void **state)
 static void crc32c_of_the_standard_check_string(void **state)
 {
     (void)state;
-    assert_int_equal(crc32c(0, "123456789", 9), 0xe3069283); // RFC 3720 polynomial, catalogue check value
+    assert_int_equal(crc32c(0, "123456789", 9),
+                     0xe3069283); // RFC 3720 polynomial, catalogue check value
     assert_int_equal(crc32c(crc32c(0, "1234", 4), "56789", 5), 0xe3069283);
     unsigned char zeros[32] = {0};
     assert_int_equal(crc32c(0, zeros, 32), 0x8a9136aa); // RFC 3720 B.4

@@ -148,8 +148,8 @@ static void u_is_that_of_linear_theory_for_variance_weights(void **state)
     readings_free(&r);
 }
 
-// What k and ks become when n is held within n's own interval lies in theirs, in a valley so curved that
-// each one's own profile stops short of it.
+// What k and ks become when n is held within n's own interval lies in theirs, in a valley so curved
+// that each one's own profile stops short of it.
 static void intervals_of_n_k_and_ks_agree_along_the_valley(void **state)
 {
     (void)state;
