@@ -139,8 +139,7 @@ static void print_status(const json_t *s)
         printf("idle      start a run: gonio run FILE.cfg\n");
     if (json_array_size(json_object_get(s, "queued")))
         printf("waiting   %zu more\n", json_array_size(json_object_get(s, "queued")));
-    json_array_foreach(json_object_get(s, "devices"), i, each)
-        print_device(each);
+    json_array_foreach(json_object_get(s, "devices"), i, each) print_device(each);
     if (*text_of(s, "last_error"))
         printf("last error: %s\n", text_of(s, "last_error"));
 }
@@ -217,10 +216,11 @@ static int run_pause(const struct verb *verb, int argc, char **argv)
     json_t *reply = NULL;
     int status = command(verb, argc, argv, "/api/v1/pause", &reply);
     if (reply)
-        fprintf(
-            stderr,
-            "run %d pauses after the reading in progress, laser off. Go on with: gonio resume\n",
-            whole(reply, "run"));
+        fprintf(stderr,
+                "run %d pauses after the reading in progress; the laser goes off then. Go on with: "
+                "gonio "
+                "resume\n",
+                whole(reply, "run"));
     json_decref(reply);
     return status;
 }

@@ -25,22 +25,14 @@
 const char *run_state_name(enum run_state s)
 {
     switch (s) {
-    case RUN_QUEUED:
-        return "queued";
-    case RUN_PREPARING:
-        return "preparing";
-    case RUN_RUNNING:
-        return "running";
-    case RUN_PAUSED:
-        return "paused";
-    case RUN_STOPPING:
-        return "stopping";
-    case RUN_STOPPED:
-        return "stopped";
-    case RUN_DONE:
-        return "done";
-    case RUN_FAILED:
-        return "failed";
+    case RUN_QUEUED: return "queued";
+    case RUN_PREPARING: return "preparing";
+    case RUN_RUNNING: return "running";
+    case RUN_PAUSED: return "paused";
+    case RUN_STOPPING: return "stopping";
+    case RUN_STOPPED: return "stopped";
+    case RUN_DONE: return "done";
+    case RUN_FAILED: return "failed";
     }
     return "unknown";
 }
@@ -115,6 +107,13 @@ int engine_nap(struct engine *e, int64_t ns)
     return instrument_wait(e->in, clk_now_ns(e->ports->clk) + ns, e->ports->cancel) < 0
                ? canceled(e)
                : 0;
+}
+
+// What may be said of the laser: off only when that was read back.
+static const char *light_text(const struct engine *e)
+{
+    return instrument_emission(e->in) ? "LASER MAY BE ON: use its key or the interlock"
+                                      : "laser off";
 }
 
 static void make_safe(struct engine *e)
@@ -355,12 +354,9 @@ static int go_to(struct engine *e, struct travel_pose *ret_at)
 static int readings_of(const struct engine *e)
 {
     switch (e->point->kind) {
-    case PLAN_DARK:
-        return e->config->dark_readings;
-    case PLAN_BEAM:
-        return e->config->beam_readings;
-    default:
-        return e->config->readings;
+    case PLAN_DARK: return e->config->dark_readings;
+    case PLAN_BEAM: return e->config->beam_readings;
+    default: return e->config->readings;
     }
 }
 
@@ -504,18 +500,22 @@ static int run_points(struct engine *e)
 
 static enum run_state finish(struct engine *e, int rc, struct gon_error *err)
 {
+    char text[700];
     if (rc < 0)
         enter(e, RUN_STOPPING, NULL);
     make_safe(e);
     if (rc == GON_E_CANCELED) {
-        enter(e, RUN_STOPPED, "laser off, axes stopped; go on with: gonio resume");
+        snprintf(text, sizeof text, "%s; go on with: gonio resume", light_text(e));
+        enter(e, RUN_STOPPED, text);
     } else if (rc < 0) {
-        enter(e, RUN_FAILED, e->why.text);
+        snprintf(text, sizeof text, "%s; %s", e->why.text, light_text(e));
+        enter(e, RUN_FAILED, text);
         if (err)
             *err = e->why;
     } else {
         e->ports->request_fit(e->ports->ctx, e->plan->sweeps, true);
-        enter(e, RUN_DONE, "every point is measured; laser off");
+        snprintf(text, sizeof text, "every point is measured; %s", light_text(e));
+        enter(e, RUN_DONE, text);
     }
     return e->state;
 }

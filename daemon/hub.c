@@ -457,17 +457,17 @@ void hub_end(struct hub *h)
 
 // The instrument thread goes first: it is the one that switches off. The store outlives those who
 // write.
-void hub_free(struct hub *h)
+bool hub_free(struct hub *h)
 {
     if (!h)
-        return;
+        return false;
     if (h->cancel)
         cancel_request(h->cancel);
     if (h->runner)
         note_post(h->run_box, note_new(NOTE_QUIT));
     if (h->fitter)
         note_post(h->fit_box, note_new(NOTE_QUIT));
-    runner_join(h->runner);
+    bool may_be_on = runner_join(h->runner);
     fitter_join(h->fitter);
     if (h->storer)
         note_post(h->store_box, note_new(NOTE_QUIT));
@@ -483,4 +483,5 @@ void hub_free(struct hub *h)
     cancel_free(h->cancel);
     free(h->snapshot);
     free(h);
+    return may_be_on;
 }

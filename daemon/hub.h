@@ -33,7 +33,8 @@ struct hub_options {
 int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options,
             struct hub **ret_hub, struct gon_error *err);
 void hub_end(struct hub *h);  // laser off, axes stopped, everything committed; then ended is called
-void hub_free(struct hub *h); // joins the workers; NULL is fine
+// Joins the workers; NULL is fine. True when the laser was not read back off: it may be on.
+bool hub_free(struct hub *h);
 
 // For api.c: what a request asks for. A ticket is answered later through HTTP.
 struct hub_status {

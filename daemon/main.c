@@ -6,6 +6,7 @@
 #include "base/paths.h"
 #include "campaign/bench.h"
 #include "campaign/catalog.h"
+#include "daemon/deadline.h"
 #include "daemon/hub.h"
 #include "daemon/listener.h"
 #include "daemon/loop.h"
@@ -43,6 +44,8 @@ static const struct option_row rows[] = {
      "this list for the manual page"},
     {NULL, OPTION_FLAG, 0, NULL, 0, 0, NULL},
 };
+
+#define END_S 4.5 // from the signal, whatever hangs
 
 struct daemon {
     struct options options;
@@ -110,6 +113,11 @@ static void signaled(void *ctx, int signal)
     struct daemon *d = ctx;
     log_say(d->log, LOG_NOTICE, "goniod", "signal %d: laser off, axes stopped, then the end",
             signal);
+    deadline_set(
+        END_S,
+        "goniod: a device or the disk does not answer; ended all the same. Readings are safe. "
+        "LASER MAY BE ON if it was: use its key or the interlock\n",
+        1);
     hub_end(d->hub);
 }
 
@@ -149,7 +157,9 @@ static void ready(void *ctx, const struct instrument_snapshot *s)
     bool lost = s->part[PART_LASER].link != PART_OK,
          on = s->emission || s->off_unconfirmed || s->laser.emission;
     printf("ready: axes %s, laser %s.   Ctrl-C stops (laser off first).\n", axes_text(s),
-           lost ? "not reachable" : on ? "NOT OFF: use its key or the interlock" : "off");
+           lost ? "not reachable"
+           : on ? "NOT OFF: use its key or the interlock"
+                : "off");
     fflush(stdout);
 }
 
@@ -256,7 +266,11 @@ static int run(struct daemon *d)
         loop_run(d->loop);
     else
         d->status = say_error(&err);
-    hub_free(d->hub);
+    if (hub_free(d->hub)) {
+        fputs("goniod: LASER MAY BE ON: it did not confirm OFF; use its key or the interlock\n",
+              stderr);
+        d->status = 1;
+    }
     loop_free(d->loop);
     simulator_stop(d->simulator);
     listener_close(d->listener);

@@ -19,20 +19,22 @@
 enum { SLICE_MS = 50, IDLE_MS = 1000 };
 #define SNAPSHOT_NS CLK_S(0.5)
 #define STORE_PATIENCE_NS CLK_S(10)
+#define STOPPED_PATIENCE_NS CLK_S(1) // once a stop is asked for: the light goes off first
 
 struct runner {
     struct runner_links links;
     pthread_t thread;
     struct instrument *in;
-    int run;                // in progress; 0: none
-    uint64_t sequence;      // of the last note that the store must acknowledge
-    uint64_t acknowledged;  // the newest acknowledged
+    int run;                 // in progress; 0: none
+    uint64_t sequence;       // of the last note that the store must acknowledge
+    uint64_t acknowledged;   // the newest acknowledged
     struct gon_error answer; // to that one
-    bool reading_open;      // the last reading was posted and not yet acknowledged
+    bool reading_open;       // the last reading was posted and not yet acknowledged
     struct store_reading reading;
     bool pause, resume, halt, quit;
-    struct note *start;     // the next run, held until the thread is idle
+    struct note *start;       // the next run, held until the thread is idle
     int64_t next_snapshot_ns; // not before every part was asked once
+    bool may_be_on;           // of the laser, at the thread's end
 };
 
 // --- what the others say -------------------------------------------------------------------------
@@ -48,9 +50,7 @@ static void take(struct runner *r, struct note *n)
         r->acknowledged = n->sequence;
         r->answer = n->err;
         break;
-    case NOTE_START:
-        r->start = n;
-        return;
+    case NOTE_START: r->start = n; return;
     default: break;
     }
     note_free(n);
@@ -99,6 +99,9 @@ static int wait_stored(struct runner *r, struct gon_error *err)
         if (n)
             take(r, n);
         instrument_breathe(r->in);
+        if (cancel_requested(r->links.cancel) &&
+            end_ns > clk_now_ns(clk_system()) + STOPPED_PATIENCE_NS)
+            end_ns = clk_now_ns(clk_system()) + STOPPED_PATIENCE_NS;
         if (clk_now_ns(clk_system()) > end_ns)
             return gon_fail(err, GON_E_STORE,
                             "store: no acknowledgement for 10 s; is the disk full, slow or gone?");
@@ -254,6 +257,18 @@ static void idle(struct runner *r)
     }
 }
 
+// One more try at a laser that was not read back off.
+static bool light_left(struct instrument *in)
+{
+    struct instrument_snapshot s;
+    instrument_snapshot(in, &s);
+    if (!s.emission && !s.off_unconfirmed)
+        return false;
+    instrument_emission_off(in, NULL);
+    instrument_snapshot(in, &s);
+    return s.emission || s.off_unconfirmed;
+}
+
 static void *thread_main(void *ctx)
 {
     struct runner *r = ctx;
@@ -268,6 +283,7 @@ static void *thread_main(void *ctx)
     instrument_watch(r->in, watch, r);
     idle(r);
     note_free(r->start);
+    r->may_be_on = light_left(r->in);
     instrument_free(r->in); // laser off, axes stopped
     return NULL;
 }
@@ -288,10 +304,12 @@ int runner_start(const struct runner_links *links, struct runner **ret_runner,
     return GON_OK;
 }
 
-void runner_join(struct runner *r)
+bool runner_join(struct runner *r)
 {
     if (!r)
-        return;
+        return false;
     pthread_join(r->thread, NULL);
+    bool may_be_on = r->may_be_on;
     free(r);
+    return may_be_on;
 }

@@ -6,6 +6,8 @@
 #pragma once
 #include "base/err.h"
 
+#include <stdbool.h>
+
 struct bench_config;
 struct cancel;
 struct mail;
@@ -21,4 +23,5 @@ struct runner_links {
 
 int runner_start(const struct runner_links *links, struct runner **ret_runner,
                  struct gon_error *err);
-void runner_join(struct runner *r); // after NOTE_QUIT; NULL is fine
+// After NOTE_QUIT; NULL is fine. True when the laser was not read back off: it may be on.
+bool runner_join(struct runner *r);

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""What goniod says of the laser is what was read back, and it ends within 5 s of SIGTERM whatever hangs."""
+import os
+import signal
+import sqlite3
+import time
+
+import pytest
+
+PLAN = """\
+campaign: {
+  name = "safety";
+  theta_i_deg = [ 20.0, 40.0 ];
+  theta_r: { from_deg = -70.0; to_deg = 70.0; step_deg = 1.0; };
+  readings: { count = 2; };
+};
+"""
+
+
+@pytest.fixture
+def measuring(start_sim, start_daemon):
+    """A run with the laser on."""
+    sim = start_sim("--fast", "--seed", "9", "--set", "laser.warmup_s=0.05", "--set", "laser.temperatures_s=0")
+    daemon = start_daemon("--config", sim.folder / "goniod.cfg")
+    reply = daemon.submit(PLAN, "safety.cfg")
+    events = daemon.follow(0)
+    for _ in range(3):
+        events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
+    assert sim.control(do="state")["laser"]["emission"]
+    yield sim, daemon, reply, events
+    os.kill(sim.pid, signal.SIGCONT)
+
+
+def test_a_stop_never_says_off_of_a_laser_that_ignores_it(measuring):
+    sim, daemon, reply, _ = measuring
+    sim.control(do="set", ignore_off=True)
+    stopped = daemon.gonio("stop")
+    assert sim.control(do="state")["laser"]["emission"]
+    assert stopped.returncode == 1 and "laser off" not in stopped.stderr, stopped.stderr
+    assert "use its key or the interlock" in stopped.stderr
+    text = daemon.request("GET", f"/api/v1/runs/{reply['run']}")[1]["text"]
+    assert "LASER MAY BE ON" in text
+    sim.control(do="set", ignore_off=False)
+    daemon_status = daemon.end()
+    assert not sim.control(do="state")["laser"]["emission"], "tried again at the end"
+    assert daemon_status == 0
+
+
+def test_a_stop_never_says_off_of_a_laser_that_is_unplugged(measuring):
+    sim, daemon, _, events = measuring
+    sim.control(do="unplug", wire="laser")
+    events.until(lambda e: e["event"] == "state" and e["state"] == "paused")
+    stopped = daemon.gonio("stop")
+    assert stopped.returncode == 1 and "laser off" not in stopped.stderr, stopped.stderr
+    assert sim.control(do="state")["laser"]["emission"]
+    assert daemon.end() == 1
+    assert "LASER MAY BE ON" in daemon.errors()
+
+
+def ends_in_time(daemon):
+    begun = time.monotonic()
+    status = daemon.end(signal.SIGTERM, patience_s=20)
+    assert time.monotonic() - begun < 5.0
+    return status
+
+
+def test_sigterm_ends_it_when_the_laser_ignores_off(measuring):
+    sim, daemon, _, _ = measuring
+    sim.control(do="set", ignore_off=True)
+    assert ends_in_time(daemon) == 1
+    assert "LASER MAY BE ON" in daemon.errors()
+
+
+def test_sigterm_ends_it_when_every_device_is_frozen(measuring):
+    sim, daemon, _, _ = measuring
+    os.kill(sim.pid, signal.SIGSTOP)
+    assert ends_in_time(daemon) == 1
+    assert "LASER MAY BE ON" in daemon.errors()
+
+
+def test_sigterm_ends_it_when_the_campaign_file_is_locked(measuring):
+    sim, daemon, reply, _ = measuring
+    with sqlite3.connect(reply["file"], isolation_level=None) as db:
+        db.execute("begin immediate")
+        ends_in_time(daemon)
+        db.execute("rollback")
+    assert not sim.control(do="state")["laser"]["emission"], "off before the end"
+    assert db.execute("pragma quick_check").fetchone() == ("ok",)
