@@ -263,8 +263,10 @@ void queue_closed(struct queue *q, int id, const struct gon_error *err)
     if (err) {
         finish(q, RUN_FAILED, err->text);
     } else {
+        const char *why = q->ended_as == RUN_DONE ? "" : q->active->text;
         char text[sizeof q->active->text];
-        snprintf(text, sizeof text, "%s", q->ended_as == RUN_DONE ? "" : q->active->text);
+        snprintf(text, sizeof text, "%.400s%s%s", why, *why && q->active->emission ? "; " : "",
+                 q->active->emission ? "LASER MAY BE ON: use its key or the interlock" : "");
         finish(q, q->ended_as, text);
     }
 }
