@@ -213,7 +213,7 @@ static const struct route {
     {"POST", "/api/v1/runs", post_runs, "GET, POST"},
     {"GET", "/api/v1/runs/", get_run, "GET"},
     {"GET", "/api/v1/events", get_events, "GET"},
-    {"POST", "/api/v1/stop", post_stop, "POST"},
+    {"POST", HTTP_STOP_PATH, post_stop, "POST"},
     {"POST", "/api/v1/pause", post_pause, "POST"},
     {"POST", "/api/v1/resume", post_resume, "POST"},
 };

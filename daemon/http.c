@@ -18,13 +18,13 @@
 
 enum {
     MOST_CONNECTIONS = 32,
-    SPARE_CONNECTIONS = 16, // to tell those beyond the limit so
+    SPARE_CONNECTIONS = 480, // silent ones, those that are told so, and whoever wants to stop
     MOST_STREAMS = 8,
     MOST_BODY = 64 * 1024,
     MOST_SWALLOWED = 1024 * 1024, // of a body that is too large, before the connection is cut
     MOST_HEADER = 8 * 1024,
     CONNECTION_MEMORY = 32 * 1024,
-    SILENCE_S = 30,
+    SILENCE_S = 12, // longer than PING_MS
     PING_MS = 10000
 };
 
@@ -91,7 +91,8 @@ static enum MHD_Result count_framing(void *cls, enum MHD_ValueKind kind, const c
 }
 
 // A reply with a status when the request is refused before its body.
-static struct http_reply check_header(struct http *h, struct MHD_Connection *c)
+// A stop is for everybody, however many others there are.
+static struct http_reply check_header(struct http *h, struct MHD_Connection *c, const char *path)
 {
     struct framing f = {0};
     MHD_get_connection_values(c, MHD_HEADER_KIND, count_framing, &f);
@@ -101,7 +102,7 @@ static struct http_reply check_header(struct http *h, struct MHD_Connection *c)
         return refuse(
             400, "the request gives its length more than once (Content-Length, Transfer-Encoding)",
             "send one of them");
-    if (h->connections > MOST_CONNECTIONS)
+    if (h->connections > MOST_CONNECTIONS && strcmp(path, HTTP_STOP_PATH) != 0)
         return refuse(503, "too many connections (32)", "close some and try again");
     if (size && size->header_size > MOST_HEADER)
         return refuse(431, "the request's header is larger than 8 KiB",
@@ -269,7 +270,7 @@ static enum MHD_Result access_handler(void *cls, struct MHD_Connection *c, const
     if (!x) {
         if (!(x = *con_cls = begin(h, c)))
             return MHD_NO;
-        x->reply = check_header(h, c);
+        x->reply = check_header(h, c, path);
         return x->reply.status ? send_reply(x) : MHD_YES;
     }
     if (*size)

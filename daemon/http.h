@@ -2,8 +2,8 @@
 // HTTP/1.1 over the daemon's Unix socket: requests with small bodies, answered at once or later,
 // and streams of server-sent events. Thread: main; never blocks.
 //
-// Limits: 32 connections (503 beyond), 8 streams (503), 64 KiB of body (413), 8 KiB of header
-// (431), 30 s of silence. A request with both Content-Length and Transfer-Encoding, or with two
+// Limits: 32 connections (503 beyond, but never for a stop; 512 in all, silent ones included), 8
+// streams (503), 64 KiB of body (413), 8 KiB of header (431), 12 s of silence. A request with both Content-Length and Transfer-Encoding, or with two
 // lengths, is 400: the library would accept it, and two readers could understand it differently.
 #pragma once
 #include "base/err.h"
@@ -11,6 +11,8 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+#define HTTP_STOP_PATH "/api/v1/stop"
 
 struct http;
 struct log;

@@ -14,7 +14,6 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-enum { BACKLOG = 64 };
 
 struct listener {
     char path[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
@@ -94,7 +93,7 @@ static int listen_there(struct listener *l, struct gon_error *err)
     mode_t mask = umask(0117);
     int rc = l->fd < 0 ? -1 : bind(l->fd, (struct sockaddr *)&address, sizeof address);
     umask(mask);
-    if (rc < 0 || listen(l->fd, BACKLOG) < 0)
+    if (rc < 0 || listen(l->fd, SOMAXCONN) < 0)
         return gon_fail(err, GON_E_INPUT, "socket %s: %s; choose another with --socket", l->path,
                         strerror(errno));
     return GON_OK;

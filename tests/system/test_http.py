@@ -4,6 +4,7 @@ import json
 import os
 import socket
 import stat
+import time
 
 import pytest
 
@@ -132,3 +133,24 @@ def test_last_event_id_must_be_a_number(daemon):
     s = Stream(daemon.socket, last_id="yesterday")
     assert s.response.status == 400
     s.close()
+
+
+def test_a_stop_gets_through_whatever_others_hold_open(start_daemon):
+    daemon = start_daemon()
+    silent = []
+    try:
+        for _ in range(100):
+            s = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            silent.append(s)
+            s.settimeout(10)
+            s.connect(str(daemon.socket))
+            s.sendall(b"GET /api/v1/status HTTP/1.1\r\n")  # and nothing more
+        status, _ = daemon.request("GET", "/api/v1/runs")
+        assert status == 503
+        begun = time.monotonic()
+        status, reply = daemon.request("POST", "/api/v1/stop")
+        assert status == 200 and reply["laser_off"], reply
+        assert time.monotonic() - begun < 2
+    finally:
+        for s in silent:
+            s.close()

@@ -210,6 +210,26 @@ static void one_sweep_and_few_points_are_fitted_with_a_warning(void **state)
     readings_free(&all);
 }
 
+// 100 times the same direction fits exactly, with a curvature of nothing: that is no knowledge.
+static void one_direction_identifies_nothing(void **state)
+{
+    (void)state;
+    enum { N = 100 };
+    double i[N], r[N], d[N], f[N];
+    for (int j = 0; j < N; j++) {
+        i[j] = r[j] = 0.35;
+        d[j] = 3.14159265358979;
+        f[j] = 0.5;
+    }
+    const struct fit_data data = {N, i, r, d, f, NULL};
+    const struct fit_options o = fit_options_default();
+    struct fit_result result;
+    assert_int_equal(fit_run(&data, &o, &result), 0);
+    for (int p = 0; p < FIT_PARAMS; p++)
+        assert_false(result.estimate[p].identified);
+    assert_true(result.warnings & FIT_WARN_NOT_IDENTIFIED);
+}
+
 static void bad_readings_have_their_stop_codes(void **state)
 {
     (void)state;
@@ -385,6 +405,7 @@ int main(void)
         cmocka_unit_test(neighbours_are_found_along_the_signed_angle),
         cmocka_unit_test(one_sweep_and_few_points_are_fitted_with_a_warning),
         cmocka_unit_test(bad_readings_have_their_stop_codes),
+        cmocka_unit_test(one_direction_identifies_nothing),
         cmocka_unit_test(bad_options_have_their_stop_code),
         cmocka_unit_test(large_sets_are_fitted_and_can_be_canceled),
         cmocka_unit_test(small_sets_can_be_canceled_by_either_method),
