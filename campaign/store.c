@@ -191,6 +191,7 @@ static int open_for_writing(struct store *s, struct gon_error *err)
     }
     s->device = st.st_dev;
     s->inode = st.st_ino;
+    s->size = st.st_size;
     s->broken = false;
     return GON_OK;
 }
@@ -357,14 +358,21 @@ int store_create(const char *path, const struct store_new *what, struct store **
     return rc >= 0 ? store_open(path, STORE_WRITE, ret_store, err) : rc;
 }
 
-// --- ready to write
-// ----------------------------------------------------------------------------------
+// --- ready to write ------------------------------------------------------------------------------
 
 static int still_there(struct store *s, struct gon_error *err)
 {
     struct stat st;
-    if (stat(s->path, &st) == 0 && st.st_dev == s->device && st.st_ino == s->inode)
+    bool same = stat(s->path, &st) == 0 && st.st_dev == s->device && st.st_ino == s->inode;
+    if (same && st.st_size < s->size)
+        return gon_fail(err, GON_E_STORE,
+                        "%s: was cut from %lld to %lld bytes while it was written; keep it and its "
+                        "-wal file, and restore it from a copy",
+                        s->path, (long long)s->size, (long long)st.st_size);
+    if (same) {
+        s->size = st.st_size;
         return GON_OK;
+    }
     return gon_fail(err, GON_E_STORE,
                     "%s: was moved, removed or replaced while it was written; put it back",
                     s->path);

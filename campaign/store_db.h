@@ -20,6 +20,7 @@ struct store {
     char path[512];
     dev_t device; // of the file as it was opened
     ino_t inode;
+    off_t size; // the largest that the file was; it never shrinks
     bool broken; // after an I/O error nothing that SQLite remembers can be trusted: reopen first
     int patience_ms;
 };

@@ -534,6 +534,20 @@ static void a_moved_file_is_noticed_at_the_next_reading(void **state)
     store_close(s, NULL);
 }
 
+static void a_cut_file_is_noticed_at_the_next_reading(void **state)
+{
+    (void)state;
+    struct store *s = created();
+    struct store_reading a = reading(1, 0, 1), b = reading(1, 1, 1);
+    struct gon_error err;
+    append(s, &a);
+    assert_int_equal(truncate(path, 0), 0);
+    assert_int_equal(store_append_reading(s, &b, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "was cut from"));
+    assert_int_equal(store_append_reading(s, &b, NULL), GON_E_STORE); // and it stays so
+    store_close(s, NULL);
+}
+
 static void anothers_write_lock_is_waited_for_then_named(void **state)
 {
     (void)state;
@@ -756,6 +770,7 @@ int main(void)
         TEST(readings_cannot_be_changed_by_accident),
         TEST(other_files_and_newer_ones_are_refused),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
+        TEST(a_cut_file_is_noticed_at_the_next_reading),
         TEST(anothers_write_lock_is_waited_for_then_named),
         TEST(a_full_disk_loses_nothing_that_was_acknowledged),
         TEST(killed_writers_lose_no_acknowledged_row),
