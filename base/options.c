@@ -98,8 +98,9 @@ static int take_number(const struct option_row *row, const char *text, void *tar
     if (row->type == OPTION_INT && value != floor(value))
         return gon_fail(err, GON_E_INPUT, "%s '%s' is not a whole number", row->name, text);
     if (!any && !(value >= row->min && value <= row->max))
-        return gon_fail(err, GON_E_INPUT, "%s %s is out of range; allowed %.9g..%.9g", row->name,
-                        text, row->min, row->max);
+        return gon_fail(err, GON_E_INPUT, "%s %s is out of range; allowed %.*g..%.*g", row->name,
+                        text, row->type == OPTION_INT ? 17 : 9, row->min,
+                        row->type == OPTION_INT ? 17 : 9, row->max);
     if (row->type == OPTION_INT && fabs(value) > 9e15)
         return gon_fail(err, GON_E_INPUT, "%s %s is too large", row->name, text);
     if (row->type == OPTION_INT)

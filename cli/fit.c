@@ -145,6 +145,19 @@ static int set_options(const struct options *o, struct fit_options *options, str
     return rc;
 }
 
+// A campaign's configuration falls back to uniform weights by itself; what was asked for does not.
+static int check_weights(const struct fit_options *options, const struct dataset *data,
+                         const char *column, struct gon_error *err)
+{
+    if (options->weighting != FIT_VARIANCE || data->u_per_sr)
+        return GON_OK;
+    return gon_fail(
+        err, GON_E_INPUT,
+        "--weights variance: %s has no uncertainty for every value (column u_%s); allowed "
+        "without: uniform, dense:G, relative",
+        data->source, column ? column : "f_r");
+}
+
 static int search(const struct dataset *data, const struct options *o, struct fit_options *options,
                   struct fit_result *ret_result, struct gon_error *err)
 {
@@ -210,6 +223,7 @@ static int run_fit(const struct verb *verb, int argc, char **argv)
         return EXIT_INPUT;
     int rc = load(&o, file, &data, &record.options, &err);
     rc = rc < 0 ? rc : set_options(&o, &record.options, &err);
+    rc = rc < 0 ? rc : check_weights(&record.options, &data, o.column, &err);
     rc = rc < 0 ? rc : search(&data, &o, &record.options, &record.result, &err);
     record.points = data.count;
     snprintf(record.note, sizeof record.note, "%s", data.note);

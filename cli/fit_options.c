@@ -28,10 +28,11 @@ static int take_weights(const char *word, struct fit_options *o, struct gon_erro
     static const char *const words[] = {"uniform", "dense:G", "relative", "variance", NULL};
     double g;
     if (!strncmp(word, "dense:", 6)) {
-        if (options_real(word + 6, &g) < 0 || g <= 0)
+        if (options_real(word + 6, &g) < 0 || g <= 0 || g > FIT_DENSE_MOST)
             return gon_fail(err, GON_E_INPUT,
-                            "--weights dense:G needs a number > 0 after the colon, not '%s'",
-                            word + 6);
+                            "--weights dense:G needs a number > 0 after the colon, not '%s'; at "
+                            "most %g",
+                            word + 6, FIT_DENSE_MOST);
         o->weighting = FIT_DENSE;
         o->dense_g = g;
         return GON_OK;
@@ -51,8 +52,29 @@ static double *bound_of(struct brdf_params *p, int param)
     return members[param];
 }
 
-// One "name=low:high"; the text is changed.
-static int take_bound(char *text, struct fit_options *o, struct gon_error *err)
+static int find_param(const char *name)
+{
+    int p = 0;
+    while (p < FIT_PARAMS && strcmp(name, fit_param_name((enum fit_param)p)) != 0)
+        p++;
+    return p;
+}
+
+static int check_bound(enum fit_param p, double low, double high, struct gon_error *err)
+{
+    double least, most;
+    fit_param_range(p, &least, &most);
+    if (!(low < high))
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is empty; low must be below high",
+                        fit_param_name(p), low, high);
+    if (low < least || high > most)
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is out of range; allowed %g..%g",
+                        fit_param_name(p), low, high, least, most);
+    return GON_OK;
+}
+
+// One "name=low:high"; the text is changed. given: bits of the parameters that were there before.
+static int take_bound(char *text, unsigned *given, struct fit_options *o, struct gon_error *err)
 {
     char *equals = strchr(text, '='), *colon = equals ? strchr(equals, ':') : NULL;
     double low, high;
@@ -60,25 +82,28 @@ static int take_bound(char *text, struct fit_options *o, struct gon_error *err)
         return gon_fail(err, GON_E_INPUT, "--bounds '%s' is not NAME=LOW:HIGH, for example n=1:3",
                         text);
     *equals = *colon = 0;
+    const int p = find_param(text);
+    if (p == FIT_PARAMS)
+        return gon_fail(err, GON_E_INPUT,
+                        "--bounds: no parameter '%s'; allowed: n, k, sigma, ks, kd", text);
     if (options_real(equals + 1, &low) < 0 || options_real(colon + 1, &high) < 0)
         return gon_fail(err, GON_E_INPUT, "--bounds %s: '%s:%s' are not two numbers", text,
                         equals + 1, colon + 1);
-    if (!(low < high))
-        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is empty; low must be below high",
-                        text, low, high);
-    for (int p = 0; p < FIT_PARAMS; p++)
-        if (!strcmp(text, fit_param_name((enum fit_param)p))) {
-            *bound_of(&o->lower, p) = low;
-            *bound_of(&o->upper, p) = high;
-            return GON_OK;
-        }
-    return gon_fail(err, GON_E_INPUT, "--bounds: no parameter '%s'; allowed: n, k, sigma, ks, kd",
-                    text);
+    if (*given >> p & 1)
+        return gon_fail(err, GON_E_INPUT, "--bounds: %s is given twice", text);
+    *given |= 1u << p;
+    int rc = check_bound((enum fit_param)p, low, high, err);
+    if (rc == 0) {
+        *bound_of(&o->lower, p) = low;
+        *bound_of(&o->upper, p) = high;
+    }
+    return rc;
 }
 
 static int take_bounds(const char *text, struct fit_options *o, struct gon_error *err)
 {
     char copy[400];
+    unsigned given = 0;
     if (strlen(text) >= sizeof copy)
         return gon_fail(err, GON_E_INPUT, "--bounds is longer than %zu characters",
                         sizeof copy - 1);
@@ -87,7 +112,7 @@ static int take_bounds(const char *text, struct fit_options *o, struct gon_error
         end = strchr(part, ',');
         if (end)
             *end = 0;
-        int rc = take_bound(part, o, err);
+        int rc = take_bound(part, &given, o, err);
         if (rc < 0)
             return rc;
     }

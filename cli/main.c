@@ -117,6 +117,12 @@ int verb_take(const struct verb *verb, int argc, char **argv, void *target, cons
 {
     struct gon_error err;
     int count = options_take(argc, argv, verb->options, target, operands, most, &err);
+    for (int i = 0; i < count; i++)
+        if (!*operands[i]) {
+            out_say("%s: %s is an empty word; see: gonio help %s", verb->name, verb->operands,
+                    verb->name);
+            return -1;
+        }
     if (count < 0)
         out_say("%s: %s; see: gonio help %s", verb->name, err.text, verb->name);
     else if (count < least)

@@ -12,9 +12,6 @@
 #include <time.h>
 
 #define PI 3.14159265358979323846
-#define INDEX_MAX 1e6
-#define SIGMA_MIN 1e-6
-#define SIGMA_MAX 1e3
 
 struct fit_options fit_options_default(void)
 {
@@ -37,11 +34,25 @@ static bool in_range(double low, double high, double least, double most)
     return low >= least && low <= high && high <= most; // false for NAN
 }
 
+void fit_param_range(enum fit_param p, double *ret_least, double *ret_most)
+{
+    static const double least[FIT_PARAMS] = {1e-6, 0, 1e-6, 0, 0},
+                        most[FIT_PARAMS] = {1e6, 1e6, 1e3, 1e100, 1e100};
+    *ret_least = least[p];
+    *ret_most = most[p];
+}
+
 static bool bounds_ok(const struct brdf_params *l, const struct brdf_params *u)
 {
-    return in_range(l->n, u->n, 1e-6, INDEX_MAX) && in_range(l->k, u->k, 0, INDEX_MAX) &&
-           in_range(l->sigma, u->sigma, SIGMA_MIN, SIGMA_MAX) &&
-           in_range(l->ks, u->ks, 0, 1e100) && in_range(l->kd, u->kd, 0, 1e100);
+    const double low[FIT_PARAMS] = {l->n, l->k, l->sigma, l->ks, l->kd},
+                 high[FIT_PARAMS] = {u->n, u->k, u->sigma, u->ks, u->kd};
+    bool ok = true;
+    for (int i = 0; i < FIT_PARAMS; i++) {
+        double least, most;
+        fit_param_range((enum fit_param)i, &least, &most);
+        ok = ok && in_range(low[i], high[i], least, most);
+    }
+    return ok;
 }
 
 static bool paper_ok(const struct fit_paper_options *p)
@@ -57,7 +68,7 @@ static bool weighting_ok(const struct fit_options *o, bool with_u)
     case FIT_UNIFORM:
     case FIT_RELATIVE: return true;
     case FIT_DENSE:
-        return o->dense_g > 0 && o->dense_g <= 1e12 && o->dense_half_width_rad >= 0 &&
+        return o->dense_g > 0 && o->dense_g <= FIT_DENSE_MOST && o->dense_half_width_rad >= 0 &&
                o->dense_half_width_rad <= PI;
     case FIT_VARIANCE: return with_u;
     }

@@ -49,13 +49,15 @@ struct fit_paper_options {
     int scaling;     // 0: fitness 1/Delta; 1: linear scaling, best = 2 x mean
 };
 
+#define FIT_DENSE_MOST 1e12
+
 struct fit_options {
     enum fit_method method;
     enum fit_weighting weighting;
-    double dense_g;
+    double dense_g; // above 0, up to FIT_DENSE_MOST
     double dense_half_width_rad;
     enum brdf_diffuse diffuse;
-    // Bounds, inclusive; equal ones hold a parameter. n and k up to 1e6, sigma in [1e-6, 1e3].
+    // Bounds, inclusive, within fit_param_range; equal ones hold a parameter.
     struct brdf_params lower, upper;
     uint64_t seed;
     int threads; // 1..64; one thread is used whatever it says: a fit of 850 readings is 6 ms
@@ -133,6 +135,9 @@ int fit_run(const struct fit_data *data, const struct fit_options *options,
             struct fit_result *ret_result);
 const char *fit_stop_text(int stop);
 const char *fit_param_name(enum fit_param p); // "n", "k", "sigma", "ks", "kd"
+
+// What bounds may be: least <= lower <= upper <= most.
+void fit_param_range(enum fit_param p, double *ret_least, double *ret_most);
 
 // One sentence a person can act on, for one bit of result->warnings; the numbers are in it.
 // Returns the length that snprintf would.

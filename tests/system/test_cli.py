@@ -40,6 +40,9 @@ def test_version():
     (["plan", "a.cfg", "b.cfg"], "'b.cfg' is one argument too many"),
     (["fit", "--sed", "1"], "did you mean '--seed'?"),
     (["fit", "x.csv", "--threads", "0"], "--threads 0 is out of range; allowed 1..64"),
+    (["fit", "x.csv", "--seed", "-1"], "--seed -1 is out of range; allowed 0..4294967295"),
+    (["fit", ""], "fit: DATA is an empty word"),
+    (["resume", ""], "is an empty word; see: gonio help resume"),
     (["help", "statsu"], "did you mean 'status'?"),
 ])
 def test_wrong_command_lines_say_what_was_meant(args, says):
@@ -193,7 +196,8 @@ def test_fit_refuses_what_is_not_data(tmp_path, text, says):
     (["--weights", "unifrom"], "did you mean 'uniform'"),
     (["--method", "magic"], "allowed: memetic, paper"),
     (["--bounds", "n=3:1"], "is empty"),
-    (["--weights", "variance"], ""),
+    (["--weights", "variance"], "has no uncertainty for every value (column u_f_r)"),
+    (["--bounds", "k=-5:-1"], "--bounds k: -5:-1 is out of range; allowed 0..1e+06"),
     (["--column", "nothing"], "nothing"),
     (["--theta-i", "91"], "0..90"),
     (["--theta-i", "1"], ""),

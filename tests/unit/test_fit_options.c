@@ -49,6 +49,14 @@ static void wrong_words_are_refused_by_name(void **state)
     refuses((struct fit_words){.bounds = "n=1:2,q=1:2"}, "no parameter 'q'");
     refuses((struct fit_words){.bounds = "n=2:1"}, "is empty");
     refuses((struct fit_words){.bounds = "n=1:nan"}, "not two numbers");
+    refuses((struct fit_words){.bounds = "k=-5:-1"},
+            "--bounds k: -5:-1 is out of range; allowed 0..1e+06");
+    refuses((struct fit_words){.bounds = "sigma=0:0.1"},
+            "--bounds sigma: 0:0.1 is out of range; allowed 1e-06..1000");
+    refuses((struct fit_words){.bounds = "n=1:1e308"},
+            "--bounds n: 1:1e+308 is out of range; allowed 1e-06..1e+06");
+    refuses((struct fit_words){.bounds = "n=1:2,kd=0:1,n=1:3"}, "--bounds: n is given twice");
+    refuses((struct fit_words){.weights = "dense:1e300"}, "not '1e300'; at most 1e+12");
 }
 
 static void angles_are_a_list(void **state)
