@@ -80,8 +80,7 @@ void cfg_show(const config_setting_t *s, char *text, size_t size)
     }
 }
 
-// --- reading
-// -----------------------------------------------------------------------------------------
+// --- reading -------------------------------------------------------------------------------------
 
 static char *slurp(int fd, size_t size)
 {
@@ -133,8 +132,7 @@ struct cfg_file *cfg_open(const char *path, struct cfg_sink sink)
     return f;
 }
 
-// --- parsing
-// -----------------------------------------------------------------------------------------
+// --- parsing -------------------------------------------------------------------------------------
 
 // libconfig takes the directive at the start of a line only, after blanks. The line's number, or 0.
 static int include_line(const char *text)
@@ -265,8 +263,7 @@ const char *cfg_text(const struct cfg_file *f)
     return f->text;
 }
 
-// --- complaints of others
-// ----------------------------------------------------------------------------
+// --- complaints of others ------------------------------------------------------------------------
 
 static config_setting_t *child(config_setting_t *s, const char *word, size_t length)
 {

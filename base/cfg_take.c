@@ -52,8 +52,7 @@ static int wrong(const struct place *at, const config_setting_t *s, const char *
     return cfg_say(at->file, cfg_line(s), "%s = %s: %s", at->path, value, text);
 }
 
-// --- numbers
-// -----------------------------------------------------------------------------------------
+// --- numbers -------------------------------------------------------------------------------------
 
 static bool limited(const struct cfg_row *row)
 {
@@ -132,8 +131,7 @@ static int take_reals(const struct place *at, const config_setting_t *s, const s
     return mistakes;
 }
 
-// --- words
-// -------------------------------------------------------------------------------------------
+// --- words ---------------------------------------------------------------------------------------
 
 // Length of the UTF-8 sequence at p, 0 when it is none. No overlong forms, no surrogates.
 static int utf8_length(const unsigned char *p)
@@ -197,8 +195,7 @@ static int take_choice(const struct place *at, const config_setting_t *s, const 
                  list, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
 }
 
-// --- one row
-// -----------------------------------------------------------------------------------------
+// --- one row -------------------------------------------------------------------------------------
 
 static int take_groups(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
 {
@@ -258,8 +255,7 @@ static int take_row(const struct place *at, const config_setting_t *s, const str
     return 0;
 }
 
-// --- defaults
-// ----------------------------------------------------------------------------------------
+// --- defaults ------------------------------------------------------------------------------------
 
 static void fall_back_group(const struct place *at, const struct cfg_row *rows);
 
@@ -344,8 +340,7 @@ static void fall_back_group(const struct place *at, const struct cfg_row *rows)
         fall_back(at, rows);
 }
 
-// --- groups
-// ------------------------------------------------------------------------------------------
+// --- groups --------------------------------------------------------------------------------------
 
 enum { MOST_ROWS = 64, LONGEST_NAME = 48 };
 

@@ -150,8 +150,7 @@ const struct cfg_row bench_config_schema[] = {
     GROUP("daemon", daemon_rows, "", "Of goniod itself."),
     {0}};
 
-// --- checks across settings
-// --------------------------------------------------------------------------
+// --- checks across settings ----------------------------------------------------------------------
 
 static int complain(struct cfg_file *f, const char *list, int index, const char *member,
                     const char *fmt, ...) __attribute__((format(printf, 5, 6)));
@@ -273,8 +272,7 @@ static int check(struct cfg_file *f, const struct bench_config *b)
     return mistakes;
 }
 
-// --- reading
-// -----------------------------------------------------------------------------------------
+// --- reading -------------------------------------------------------------------------------------
 
 static int take(struct cfg_file *f, struct bench_config *ret_bench, char **ret_text)
 {

@@ -17,8 +17,7 @@
 
 enum { MOST_SLUG = 40 };
 
-// --- where
-// -------------------------------------------------------------------------------------------
+// --- where ---------------------------------------------------------------------------------------
 
 static int put_path(char *ret_path, size_t size, struct gon_error *err, const char *a,
                     const char *b)
@@ -62,8 +61,7 @@ int catalog_make_directory(const char *directory, struct gon_error *err)
     return rc;
 }
 
-// --- names
-// -------------------------------------------------------------------------------------------
+// --- names ---------------------------------------------------------------------------------------
 
 static bool ends(const char *name, const char *suffix)
 {
@@ -137,8 +135,7 @@ int catalog_create(const char *directory, const struct store_new *what, struct s
     return rc;
 }
 
-// --- what is there
-// -----------------------------------------------------------------------------------
+// --- what is there -------------------------------------------------------------------------------
 
 static void copy_meta(struct store *s, const char *key, char *text, size_t size)
 {
@@ -247,8 +244,7 @@ int catalog_list(const char *directory, struct catalog_entry **ret_entries, stru
     return l.count;
 }
 
-// --- FILE
-// --------------------------------------------------------------------------------------------
+// --- FILE ----------------------------------------------------------------------------------------
 
 struct search {
     const char *directory, *wanted;

@@ -47,8 +47,7 @@ void plan_clear(struct plan *p)
     *p = (struct plan){0};
 }
 
-// --- growing lists
-// -----------------------------------------------------------------------------------
+// --- growing lists -------------------------------------------------------------------------------
 
 static void *grow(void *list, int count, int *room, size_t size)
 {
@@ -101,8 +100,7 @@ static void warn(struct maker *m, const char *fmt, ...)
     va_end(args);
 }
 
-// --- directions
-// --------------------------------------------------------------------------------------
+// --- directions ----------------------------------------------------------------------------------
 
 static int by_value(const void *a, const void *b)
 {
@@ -210,8 +208,7 @@ static int add_all(struct maker *m, struct gon_error *err)
     return rc >= 0 ? add_reference(m, c->theta_i_count + 1, 1, PLAN_DARK, err) : rc;
 }
 
-// --- warnings
-// ----------------------------------------------------------------------------------------
+// --- warnings ------------------------------------------------------------------------------------
 
 static void warn_of_directions(struct maker *m)
 {
@@ -271,8 +268,7 @@ static void warn_of_polarisation(struct maker *m)
              polarisation_name((enum polarisation)c->pol_out));
 }
 
-// --- time
-// --------------------------------------------------------------------------------------------
+// --- time ----------------------------------------------------------------------------------------
 
 // What is left of a step of 1 after x time constants of n equal poles.
 static double residual(int n, double x)
@@ -359,8 +355,7 @@ static double duration_s(const struct maker *m)
     return total;
 }
 
-// --- all of it
-// ---------------------------------------------------------------------------------------
+// --- all of it -----------------------------------------------------------------------------------
 
 int plan_make(const struct campaign_config *config, const struct bench_config *bench,
               struct plan *ret_plan, struct gon_error *err)

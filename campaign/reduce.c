@@ -8,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// --- which readings count
-// ----------------------------------------------------------------------------
+// --- which readings count ------------------------------------------------------------------------
 
 static bool accepted(const struct store_reading *r)
 {
@@ -28,8 +27,7 @@ static const struct store_reading *reading_of(const struct plan_point *p,
     return found;
 }
 
-// --- noise
-// -------------------------------------------------------------------------------------------
+// --- noise ---------------------------------------------------------------------------------------
 
 struct variance { // of one reading's samples
     double v2;    // square of the mean signal, over the largest
@@ -125,8 +123,7 @@ static double sample_u_v(const struct reduce_noise *n, double signal_v)
     return hypot(n->floor_v, n->rel * signal_v);
 }
 
-// --- references
-// --------------------------------------------------------------------------------------
+// --- references ----------------------------------------------------------------------------------
 
 // Mean and standard uncertainty of the mean of a few values, from their scatter: 0 for a single
 // one.
@@ -208,8 +205,7 @@ struct reduce_reference reduce_opening(const struct plan *plan, const struct sto
     return means(&f);
 }
 
-// --- points
-// ------------------------------------------------------------------------------------------
+// --- points --------------------------------------------------------------------------------------
 
 static double cosine(const struct reduction *r, const struct reduced_point *p)
 {
@@ -260,8 +256,7 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
     return GON_OK;
 }
 
-// --- all of it
-// ---------------------------------------------------------------------------------------
+// --- all of it -----------------------------------------------------------------------------------
 
 static int reduce_references(struct reduction *r, const struct references *f,
                              double *ret_beam_ratio, struct gon_error *err)

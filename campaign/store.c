@@ -14,8 +14,7 @@
 
 enum { CHECKED_READINGS = 1000 };
 
-// --- SQLite with our errors
-// --------------------------------------------------------------------------
+// --- SQLite with our errors ----------------------------------------------------------------------
 
 static int busy(struct store *s, struct gon_error *err)
 {
@@ -98,8 +97,7 @@ int store_db_end(struct store *s, int rc, struct gon_error *err)
     return rc;
 }
 
-// --- opening
-// -----------------------------------------------------------------------------------------
+// --- opening -------------------------------------------------------------------------------------
 
 static void close_db(struct store *s)
 {
@@ -296,8 +294,7 @@ const char *store_path(const struct store *s)
     return s->path;
 }
 
-// --- a new file
-// --------------------------------------------------------------------------------------
+// --- a new file ----------------------------------------------------------------------------------
 
 // Renames without replacing, also where the file system has no such rename.
 static int publish(const char *temporary, const char *path)

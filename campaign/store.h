@@ -100,9 +100,8 @@ void store_set_patience(struct store *s, int patience_ms);
 // The process that has the file open for writing, 0: none.
 int store_writer(const char *path);
 
-// --- writing
-// ----------------------------------------------------------------------------------------- The
-// same row again is accepted again; another row with the same (sweep, point, attempt) is
+// --- writing -------------------------------------------------------------------------------------
+// The same row again is accepted again; another row with the same (sweep, point, attempt) is
 // GON_E_INPUT, as is a value that is not finite and a point that is not in the plan.
 int store_append_reading(struct store *s, const struct store_reading *r, struct gon_error *err);
 int store_append_event(struct store *s, int64_t t_utc_ms, const char *level, const char *source,
@@ -115,8 +114,7 @@ int store_append_reduction(struct store *s, int64_t t_utc_ms, const struct reduc
 int store_append_fit(struct store *s, int64_t t_utc_ms, const struct fit_record *f, int64_t *ret_id,
                      struct gon_error *err);
 
-// --- reading
-// -----------------------------------------------------------------------------------------
+// --- reading -------------------------------------------------------------------------------------
 const char *store_path(const struct store *s);
 int store_read_plan(struct store *s, struct plan *ret_plan,
                     struct gon_error *err); // done and attempts filled in

@@ -8,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// --- readings
-// ----------------------------------------------------------------------------------------
+// --- readings ------------------------------------------------------------------------------------
 
 // The row that is there already: the same is accepted again, another one is a mistake.
 static int compare(struct store *s, const struct store_reading *r, struct gon_error *err)
@@ -78,8 +77,7 @@ int store_append_reading(struct store *s, const struct store_reading *r, struct 
     return there ? compare(s, r, err) : rc;
 }
 
-// --- what happened
-// -----------------------------------------------------------------------------------
+// --- what happened -------------------------------------------------------------------------------
 
 static int append_texts(struct store *s, const char *sql, int64_t t_utc_ms, const char *a,
                         const char *b, const char *c, struct gon_error *err)
@@ -113,8 +111,7 @@ int store_append_state(struct store *s, int64_t t_utc_ms, const char *state, con
                         state, why, NULL, err);
 }
 
-// --- results
-// -----------------------------------------------------------------------------------------
+// --- results -------------------------------------------------------------------------------------
 
 static int put_reduction(struct store *s, int64_t t_utc_ms, const struct reduction *r,
                          struct gon_error *err)

@@ -97,8 +97,7 @@ int store_lock_holder(const char *file)
     return pid;
 }
 
-// --- where a file may lie
-// ----------------------------------------------------------------------------
+// --- where a file may lie ------------------------------------------------------------------------
 
 bool store_lock_is_network(long statfs_type, const char *mount_type)
 {
@@ -160,8 +159,7 @@ int store_lock_local(const char *file, struct gon_error *err)
     return GON_OK;
 }
 
-// --- who holds SQLite's lock
-// -------------------------------------------------------------------------
+// --- who holds SQLite's lock ---------------------------------------------------------------------
 
 // Lines like "3: POSIX  ADVISORY  WRITE 4711 08:01:131090 120 120".
 int store_lock_wal_writer(const char *file)

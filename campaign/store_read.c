@@ -22,8 +22,7 @@ static void copy_text(sqlite3_stmt *q, int column, char *text, size_t size)
         snprintf(text, size, "%s", found ? found : "");
 }
 
-// --- plan
-// --------------------------------------------------------------------------------------------
+// --- plan ----------------------------------------------------------------------------------------
 
 static int add_point(struct plan *p, int *room, sqlite3_stmt *q)
 {
@@ -127,8 +126,7 @@ int store_read_progress(struct store *s, struct store_progress *ret_progress, st
     return GON_OK;
 }
 
-// --- readings
-// ----------------------------------------------------------------------------------------
+// --- readings ------------------------------------------------------------------------------------
 
 static struct store_reading reading_of(sqlite3_stmt *q)
 {
@@ -197,8 +195,7 @@ int store_read_readings(struct store *s, int sweep, struct store_reading **ret_r
     return rc;
 }
 
-// --- texts
-// -------------------------------------------------------------------------------------------
+// --- texts ---------------------------------------------------------------------------------------
 
 static char *read_text(struct store *s, const char *sql, const char *key, int number)
 {
@@ -282,8 +279,7 @@ int store_read_bench(struct store *s, struct bench_config *ret_bench, struct gon
     return rc;
 }
 
-// --- history
-// -----------------------------------------------------------------------------------------
+// --- history -------------------------------------------------------------------------------------
 
 int store_read_state(struct store *s, char *ret_state, size_t state_size, char *ret_why,
                      size_t why_size, int64_t *ret_since_ms, struct gon_error *err)

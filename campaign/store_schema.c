@@ -79,8 +79,7 @@ const char store_schema_sql[] =
     " chi2_per_dof, warnings, elapsed_ms FROM fit;";
 // clang-format on
 
-// --- the first content
-// -------------------------------------------------------------------------------
+// --- the first content ---------------------------------------------------------------------------
 
 static int put_text(struct store *s, const char *key, const char *text, struct gon_error *err)
 {

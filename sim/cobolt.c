@@ -11,8 +11,7 @@
 #define FIRMWARE "7.104"
 enum { REPLY = 80 };
 
-// --- actions: 0, or the reason of a refusal
-// -----------------------------------------------------------
+// --- actions: 0, or the reason of a refusal ------------------------------------------------------
 
 static const char *start(struct sim_laser *l, bool autostart_sequence)
 {
@@ -97,8 +96,7 @@ static const struct {
     {"@cobas 0", autostart_off},
 };
 
-// --- queries and settings
-// -----------------------------------------------------------------------------
+// --- queries and settings ------------------------------------------------------------------------
 
 // False: not a query that is known.
 static bool query(const struct sim_cobolt *c, const char *q, char ret_text[REPLY])
@@ -209,8 +207,7 @@ static void command(struct sim_cobolt_port *p, const char *line, int64_t t_ns)
     port_send(&p->port, out, n < PORT_REPLY_MOST ? (size_t)n : PORT_REPLY_MOST, t_ns + c->reply_ns);
 }
 
-// --- the port
-// -----------------------------------------------------------------------------------------
+// --- the port ------------------------------------------------------------------------------------
 
 static void feed(struct port *port, const uint8_t *bytes, size_t size, int64_t t_ns)
 {

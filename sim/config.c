@@ -124,8 +124,7 @@ const struct cfg_row sim_config_schema[] = {
     GROUP("wires", wires_rows, "how the wires behave"),
     {0}};
 
-// --- one setting
-// --------------------------------------------------------------------------------------
+// --- one setting ---------------------------------------------------------------------------------
 
 static int wrong(const char *path, const char *value, const char *allowed, struct gon_error *err)
 {

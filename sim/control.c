@@ -48,8 +48,7 @@ static struct sim_az *the_axis(struct request *r)
     return i < 0 ? NULL : &r->c->bench->az[i];
 }
 
-// --- what is asked
-// ------------------------------------------------------------------------------------
+// --- what is asked -------------------------------------------------------------------------------
 
 static json_t *axes_state(const struct request *r)
 {
@@ -142,8 +141,7 @@ static void do_truth(struct request *r)
                                   w->monitor_v_per_w, "monitor_dark_v", w->monitor_dark_v));
 }
 
-// --- what is done
-// -------------------------------------------------------------------------------------
+// --- what is done --------------------------------------------------------------------------------
 
 static void do_plug(struct request *r)
 {
@@ -307,8 +305,7 @@ static void do_set(struct request *r)
             keys[i].set(r, v);
 }
 
-// --- one line
-// -----------------------------------------------------------------------------------------
+// --- one line ------------------------------------------------------------------------------------
 
 static const struct {
     const char *verb;

@@ -30,8 +30,7 @@ static void put_word(uint8_t *p, int value)
     p[1] = (uint8_t)value;
 }
 
-// --- requests and answers (PDU: function code and what follows)
-// -------------------------------------
+// --- requests and answers (PDU: function code and what follows) ----------------------------------
 
 // The length that the request's first bytes promise; 0: not enough of them yet, -1: no request we
 // know.
@@ -141,8 +140,7 @@ static bool answer(struct sim_modbus *m, int id, const uint8_t *pdu, int size, i
     return true;
 }
 
-// --- RTU
-// ----------------------------------------------------------------------------------------------
+// --- RTU -----------------------------------------------------------------------------------------
 
 static void rtu_frame(struct sim_modbus *m, size_t size, int64_t t_ns)
 {
@@ -186,8 +184,7 @@ static void rtu_by_length(struct sim_modbus *m, int64_t t_ns)
     }
 }
 
-// --- TCP
-// ----------------------------------------------------------------------------------------------
+// --- TCP -----------------------------------------------------------------------------------------
 
 static void tcp_frames(struct sim_modbus *m, int64_t t_ns)
 {
@@ -212,8 +209,7 @@ static void tcp_frames(struct sim_modbus *m, int64_t t_ns)
     }
 }
 
-// --- the port
-// -----------------------------------------------------------------------------------------
+// --- the port ------------------------------------------------------------------------------------
 
 static void feed(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
 {

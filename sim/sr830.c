@@ -68,8 +68,7 @@ static void reset(struct sim_sr830 *s)
     apply(s);
 }
 
-// --- one command
-// --------------------------------------------------------------------------------------
+// --- one command ---------------------------------------------------------------------------------
 
 struct request {
     struct sim_sr830 *s;
@@ -274,8 +273,7 @@ static bool run_setting(struct request *r, int i)
     return true;
 }
 
-// --- lines
-// --------------------------------------------------------------------------------------------
+// --- lines ---------------------------------------------------------------------------------------
 
 // "SNAP? 1,2,9,5": name of four letters, '?', parameters. False: not of that form.
 static bool parse(char *text, char name[5], struct request *r)

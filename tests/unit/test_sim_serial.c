@@ -57,8 +57,7 @@ static const char *lockin(struct rig *r, const char *command)
     return say(r, BENCH_DETECTOR, command);
 }
 
-// --- Cobolt
-// -------------------------------------------------------------------------------------------
+// --- Cobolt --------------------------------------------------------------------------------------
 
 static void the_laser_answers_lines(void **state)
 {
@@ -192,8 +191,7 @@ static void an_echo_comes_before_the_answer(void **state)
     free(r);
 }
 
-// --- SR830
-// --------------------------------------------------------------------------------------------
+// --- SR830 ---------------------------------------------------------------------------------------
 
 static struct rig *listening(void)
 {

@@ -54,8 +54,7 @@ static void streams_and_seeds_differ_and_repeat(void **state)
     assert_true(x != noise_bits(&d));
 }
 
-// --- motion
-// -------------------------------------------------------------------------------------------
+// --- motion --------------------------------------------------------------------------------------
 
 static struct motion an_axis(double backlash)
 {
@@ -161,8 +160,7 @@ static void a_hard_limit_stops_the_motor_there(void **state)
     assert_true(s.motor == 100 && !s.moving && s.speed == 0);
 }
 
-// --- laser
-// --------------------------------------------------------------------------------------------
+// --- laser ---------------------------------------------------------------------------------------
 
 static struct sim_laser a_laser(void)
 {
@@ -239,8 +237,7 @@ static void an_open_interlock_ends_emission_and_asks_for_the_key(void **state)
     assert_true(sim_laser_emits(&l));
 }
 
-// --- optics
-// -------------------------------------------------------------------------------------------
+// --- optics --------------------------------------------------------------------------------------
 
 static double detected(double theta_i, double theta_r, double sample_mm)
 {
@@ -300,8 +297,7 @@ static void a_term_that_is_off_adds_nothing(void **state)
     assert_int_equal(optics_term("ghost"), -1);
 }
 
-// --- lock-in
-// ------------------------------------------------------------------------------------------
+// --- lock-in -------------------------------------------------------------------------------------
 
 // Times in time constants until the residual of a step is 1e-2 .. 1e-6, to 0.05 (instruments.md 1).
 static const double settle_tc[4][5] = {{4.6, 6.9, 9.2, 11.5, 13.8},
@@ -411,8 +407,7 @@ static void the_phase_turns_x_into_y(void **state)
     near(lockin_y_v(&l), -0.25, 2e-5);
 }
 
-// --- the whole world
-// ----------------------------------------------------------------------------------
+// --- the whole world -----------------------------------------------------------------------------
 
 static void put(struct world *w, double theta_i, double theta_r, double sample_mm)
 {
