@@ -64,7 +64,7 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
         .f_per_sr = (double)NAN,
         .u_per_sr = (double)NAN,
         .left_s = seconds_left(e),
-        .emission = instrument_emission(e->in),
+        .light = instrument_light_left(e->in),
         .text = text,
     };
 }
@@ -109,17 +109,15 @@ int engine_nap(struct engine *e, int64_t ns)
                : 0;
 }
 
-// What may be said of the laser: off only when that was read back.
 static const char *light_text(const struct engine *e)
 {
-    return instrument_emission(e->in) ? "LASER MAY BE ON: use its key or the interlock"
-                                      : "laser off";
+    return safety_light_text(instrument_light_left(e->in));
 }
 
 static void make_safe(struct engine *e)
 {
     struct gon_error err;
-    const bool was_on = instrument_emission(e->in);
+    const bool was_on = instrument_light_left(e->in) == SAFETY_LIGHT_MAYBE;
     e->ready = e->lit = e->dark = false;
     instrument_permit(e->in, false);
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
@@ -142,6 +140,54 @@ int engine_operator_paused(struct engine *e)
     return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
 }
 
+static int next_lost(const struct instrument_snapshot *s, int part)
+{
+    while (part < PART_COUNT && s->part[part].link != PART_LOST)
+        part++;
+    return part;
+}
+
+// "axis theta_i, axis theta_r (rtu://...), laser (serial://...)", an address once for those that
+// share it. Returns how many are lost.
+static int name_lost(const struct engine *e, char *text, size_t size)
+{
+    struct instrument_snapshot s;
+    size_t length = 0;
+    int lost = 0;
+    instrument_snapshot(e->in, &s);
+    *text = 0;
+    for (int i = next_lost(&s, 0), next; i < PART_COUNT && length < size; i = next) {
+        const struct part_state *p = &s.part[i];
+        next = next_lost(&s, i + 1);
+        const bool shared = next < PART_COUNT && !strcmp(p->address, s.part[next].address);
+        const bool told = *p->address && !shared;
+        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s",
+                                   lost++ ? ", " : "", i < INSTRUMENT_AXES ? "axis " : "", p->name,
+                                   told ? " (" : "", told ? p->address : "", told ? ")" : "");
+    }
+    return lost;
+}
+
+static void describe_loss(const struct engine *e, char *text, size_t size)
+{
+    char names[360];
+    const int lost = name_lost(e, names, sizeof names);
+    if (e->why.code == GON_E_GONE && lost > 0)
+        snprintf(text, size, "%s: unplugged; waiting for %s to come back", names,
+                 lost == 1 ? "it" : "them");
+    else
+        snprintf(text, size, "%.400s; trying again", e->why.text);
+}
+
+// The warning comes first: whoever reads half of the line has read it.
+static void enter_pause(struct engine *e, const char *text)
+{
+    char whole[640];
+    const bool off = instrument_light_left(e->in) == SAFETY_LIGHT_OFF;
+    snprintf(whole, sizeof whole, "%s%s%s", off ? "" : light_text(e), off ? "" : "; ", text);
+    enter(e, RUN_PAUSED, whole);
+}
+
 static int wait_for_operator(struct engine *e)
 {
     int64_t tend_ns = 0;
@@ -161,7 +207,7 @@ static int wait_for_devices(struct engine *e)
 {
     do {
         if (engine_pause_asked(e)) {
-            enter(e, RUN_PAUSED, "paused by the operator; go on with: gonio resume");
+            enter_pause(e, "paused by the operator; go on with: gonio resume");
             return wait_for_operator(e);
         }
         (void)resume_asked(e); // it goes on by itself anyway
@@ -169,20 +215,6 @@ static int wait_for_devices(struct engine *e)
             return GON_E_CANCELED;
     } while (instrument_reconnect(e->in) > 0);
     return 0;
-}
-
-static void describe_loss(const struct engine *e, char *text, size_t size)
-{
-    struct instrument_snapshot s;
-    const enum instrument_part part = instrument_lost(e->in);
-    instrument_snapshot(e->in, &s);
-    if (e->why.code == GON_E_GONE && part < PART_COUNT)
-        snprintf(text, size, "%s%s: unplugged%s%s%s; waiting for it to come back",
-                 part < INSTRUMENT_AXES ? "axis " : "", s.part[part].name,
-                 s.part[part].address[0] ? " (" : "", s.part[part].address,
-                 s.part[part].address[0] ? ")" : "");
-    else
-        snprintf(text, size, "%.400s; trying again", e->why.text);
 }
 
 // Emission off, axes stopped, and what is to be done depends on what happened (e->why). 0: go on.
@@ -198,12 +230,12 @@ static int pause_run(struct engine *e)
     if (by_itself && e->returns < RETURNS_MOST) {
         e->returns++;
         describe_loss(e, text, sizeof text);
-        enter(e, RUN_PAUSED, text);
+        enter_pause(e, text);
         rc = wait_for_devices(e);
     } else {
         snprintf(text, sizeof text, "%.440s%s", e->why.text,
                  by_itself ? "; it keeps failing: look at it, then: gonio resume" : "");
-        enter(e, RUN_PAUSED, text);
+        enter_pause(e, text);
         rc = wait_for_operator(e);
         e->returns = 0;
     }
@@ -226,7 +258,7 @@ static int store(struct engine *e, const struct store_reading *row)
     snprintf(text, sizeof text, "store: %.400s; the reading is kept and offered again each second",
              e->why.text);
     make_safe(e);
-    enter(e, RUN_PAUSED, text);
+    enter_pause(e, text);
     while (rc == GON_E_STORE) {
         instrument_wait(e->in, clk_now_ns(e->ports->clk) + STORE_RETRY_NS, e->ports->cancel);
         rc = e->ports->store_reading(e->ports->ctx, row, &e->why);

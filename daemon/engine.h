@@ -15,6 +15,7 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/err.h"
+#include "daemon/safety.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -52,7 +53,7 @@ struct engine_event {
     double u_per_sr; // type A
     unsigned flags;  // of the stored reading
     double left_s;   // estimate; NAN unknown
-    bool emission;
+    enum safety_light light;
     const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
 

@@ -57,18 +57,18 @@ static void answer_stops(struct hub *h, int status, const char *body)
     h->stop_count = 0;
 }
 
-// Read back off by a laser that can be reached; anything else must not be called off.
+// Read back off by a laser that can be reached; nothing else may be called off.
 static bool laser_is_off(const struct hub *h)
 {
     const struct instrument_snapshot *s = h->snapshot;
     return s && s->part[PART_LASER].link == PART_OK && !s->emission && !s->off_unconfirmed;
 }
 
-static void answer_stopped(struct hub *h, json_t *o)
+static void answer_stopped(struct hub *h, int status, json_t *o)
 {
     json_object_set_new(o, "laser_off", json_boolean(laser_is_off(h)));
     char *body = view_text(o);
-    answer_stops(h, 200, body ? body : "{}");
+    answer_stops(h, status, body);
     free(body);
 }
 
@@ -96,7 +96,7 @@ static void changed(void *ctx, const struct run *run)
     if (run == queue_active(h->queue))
         keep_state(h, run);
     if (queue_idle(h->queue) && h->stop_count)
-        answer_stopped(h, view_run(run, false));
+        answer_stopped(h, 200, view_run(run, false));
 }
 
 static void happened(struct hub *h, const struct note *n)
@@ -313,10 +313,10 @@ static void halted(struct hub *h, const struct note *n)
     if (n->err.code) {
         snprintf(h->last_error, sizeof h->last_error, "%s", n->err.text);
         char *body = api_error(n->err.code, n->err.text);
-        answer_stops(h, 500, body);
+        answer_stopped(h, 500, json_loads(body, 0, NULL));
         free(body);
     } else {
-        answer_stopped(h, json_pack("{s:n, s:s}", "run", "state", "idle"));
+        answer_stopped(h, 200, json_pack("{s:n, s:s}", "run", "state", "idle"));
     }
 }
 

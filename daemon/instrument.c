@@ -366,8 +366,8 @@ static void ask(struct instrument *in, enum instrument_part part)
         instrument_place(in, part, &place, NULL);
     else if (part == PART_DETECTOR)
         instrument_sample(in, &sample, NULL);
-    else if (safety_pending(in->safety) || (instrument_laser(in, &laser, NULL) >= 0 &&
-                                            laser.emission && !safety_emission(in->safety)))
+    else if (instrument_laser(in, &laser, NULL) >= 0 && laser.emission &&
+             !safety_emission(in->safety))
         instrument_emission_off(in, NULL);
 }
 
@@ -386,6 +386,8 @@ static void try_again(struct instrument *in, enum instrument_part part)
 int instrument_reconnect(struct instrument *in)
 {
     int lost = 0;
+    if (in->part[PART_LASER].link == PART_OK && safety_pending(in->safety))
+        instrument_emission_off(in, NULL);
     for (enum instrument_part part = 0; part < PART_COUNT; part++) {
         if (in->part[part].link == PART_LOST)
             try_again(in, part);

@@ -98,7 +98,7 @@ int64_t instrument_utc_ns(const struct instrument *in);
 
 // For an instrument that runs nothing, about once a second: asks every part that is there how it is
 // and tries once to bring back one that is lost (paced, 0.2 to 2 s). Repeats an unconfirmed off.
-// Returns the number of parts lost. instrument_reconnect is the second half alone.
+// Returns the number of parts lost. instrument_reconnect is all of it but the asking.
 int instrument_tend(struct instrument *in);
 int instrument_reconnect(struct instrument *in);
 
@@ -145,7 +145,7 @@ int instrument_power(struct instrument *in, double power_w, struct gon_error *er
 int instrument_emission_on(struct instrument *in, struct gon_error *err);
 int instrument_emission_off(struct instrument *in, struct gon_error *err);
 void instrument_permit(struct instrument *in, bool running);
-bool instrument_emission(const struct instrument *in);
+enum safety_light instrument_light_left(const struct instrument *in); // what may be said of it
 const struct safety *instrument_safety(const struct instrument *in);
 
 // --- detector ---------------------------------------------------------------------------------

@@ -188,9 +188,10 @@ void instrument_permit(struct instrument *in, bool running)
         safety_permit(in->safety, running);
 }
 
-bool instrument_emission(const struct instrument *in)
+// A laser that was never reached was never told anything either.
+enum safety_light instrument_light_left(const struct instrument *in)
 {
-    return in->safety && safety_emission(in->safety);
+    return in->safety ? safety_light(in->safety) : SAFETY_LIGHT_UNCONFIRMED;
 }
 
 const struct safety *instrument_safety(const struct instrument *in)

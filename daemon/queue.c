@@ -102,9 +102,10 @@ struct run *queue_know(struct queue *q, const struct run *run)
 static void change(struct queue *q, struct run *run, enum run_state state, const char *text)
 {
     run->state = state;
-    snprintf(run->text, sizeof run->text, "%s", text ? text : "");
+    if (text != run->text)
+        snprintf(run->text, sizeof run->text, "%s", text ? text : "");
     if (state == RUN_DONE || state == RUN_FAILED || state == RUN_STOPPED)
-        run->emission = false;
+        run->light = SAFETY_LIGHT_OFF; // no longer this run's: the devices' state tells on
     q->ports.changed(q->ports.ctx, run);
 }
 
@@ -177,12 +178,23 @@ static void finish(struct queue *q, enum run_state state, const char *text)
     next(q);
 }
 
+// How it ended, for the file and for those who watch; the warning first.
+static void word_end(struct run *run, enum run_state as)
+{
+    char why[sizeof run->text];
+    const bool off = run->light == SAFETY_LIGHT_OFF;
+    snprintf(why, sizeof why, "%s", as == RUN_DONE ? "" : run->text);
+    snprintf(run->text, sizeof run->text, "%s%s%.400s", off ? "" : safety_light_text(run->light),
+             off || !*why ? "" : "; ", why);
+}
+
 // Measured, and no fit is under way: the file can be closed.
 static void close_if_ready(struct queue *q)
 {
     if (q->phase != FITTING || q->active->fits_open > 0)
         return;
     q->phase = CLOSING;
+    word_end(q->active, q->ended_as);
     q->ports.close(q->ports.ctx, q->active, q->ended_as);
 }
 
@@ -203,7 +215,7 @@ void queue_engine_event(struct queue *q, int id, const struct engine_event *even
     struct run *run = find(q, id);
     if (!run || run != q->active)
         return;
-    run->emission = event->emission;
+    run->light = event->light;
     run->left_s = event->left_s;
     run->sweeps = event->sweeps;
     run->sweep = event->sweep;
@@ -260,15 +272,10 @@ void queue_ended(struct queue *q, int id, enum run_state state, const struct gon
 void queue_closed(struct queue *q, int id, const struct gon_error *err)
 {
     assert(q->phase == CLOSING && q->active->id == id);
-    if (err) {
+    if (err)
         finish(q, RUN_FAILED, err->text);
-    } else {
-        const char *why = q->ended_as == RUN_DONE ? "" : q->active->text;
-        char text[sizeof q->active->text];
-        snprintf(text, sizeof text, "%.400s%s%s", why, *why && q->active->emission ? "; " : "",
-                 q->active->emission ? "LASER MAY BE ON: use its key or the interlock" : "");
-        finish(q, q->ended_as, text);
-    }
+    else
+        finish(q, q->ended_as, q->active->text);
 }
 
 const struct run *queue_active(const struct queue *q)

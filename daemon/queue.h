@@ -28,7 +28,7 @@ struct run {
     double theta_i_deg, theta_r_deg, f_per_sr, u_per_sr;
     unsigned flags;
     double left_s;       // NAN unknown
-    bool emission;
+    enum safety_light light;
     int fits_open;       // asked for and not yet stored
     bool fit_failed;     // the last one
     char *fit;           // JSON of the last one stored; NULL: none in this life of the daemon

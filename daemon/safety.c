@@ -114,7 +114,7 @@ int safety_off(struct safety *s, struct gon_error *err)
     }
     // Before the first ON there is only a link that fails; afterwards light may come out.
     if ((s->emission || rc == GON_E_DEVICE) && !strstr(why.text, "LASER MAY BE ON"))
-        return gon_fail(err, rc, "LASER MAY BE ON: use its key or the interlock (%s)", why.text);
+        return gon_fail(err, rc, "%s (%s)", safety_light_text(SAFETY_LIGHT_MAYBE), why.text);
     return gon_fail(err, rc, "%s", why.text);
 }
 
@@ -140,6 +140,23 @@ const char *safety_fault_text(const struct safety *s, int code)
 {
     const char *text = s->laser->ops->fault_text ? s->laser->ops->fault_text(code) : NULL;
     return text ? text : "no text for it";
+}
+
+enum safety_light safety_light(const struct safety *s)
+{
+    return s->emission  ? SAFETY_LIGHT_MAYBE
+           : s->pending ? SAFETY_LIGHT_UNCONFIRMED
+                        : SAFETY_LIGHT_OFF;
+}
+
+const char *safety_light_text(enum safety_light light)
+{
+    switch (light) {
+    case SAFETY_LIGHT_OFF: return "laser off";
+    case SAFETY_LIGHT_UNCONFIRMED: return "the laser does not confirm that it is off: look at it";
+    case SAFETY_LIGHT_MAYBE: break;
+    }
+    return "LASER MAY BE ON: use its key or the interlock";
 }
 
 bool safety_emission(const struct safety *s)

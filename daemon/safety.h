@@ -22,7 +22,14 @@
 
 struct safety;
 
-#define SAFETY_OFF_S 5.0          // how long one safety_off tries
+// What may be said of the light, and nothing better.
+enum safety_light {
+    SAFETY_LIGHT_OFF,         // the last off was read back, and no on was sent since
+    SAFETY_LIGHT_UNCONFIRMED, // no on was sent since an off that was read back; the last one was not
+    SAFETY_LIGHT_MAYBE        // on was sent, and no off was read back since
+};
+
+#define SAFETY_OFF_S 1.5          // how long one safety_off tries
 #define SAFETY_TICK_MOST_MS 200.0 // the longest silence allowed while emission is on
 
 // Takes over laser, also when it fails (then the laser is freed). NULL without memory.
@@ -51,6 +58,9 @@ int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_
 int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err);
 const char *safety_fault_text(const struct safety *s, int code);
 
+enum safety_light safety_light(const struct safety *s);
+// "laser off", or a warning with what to do; one clause, no full stop.
+const char *safety_light_text(enum safety_light light);
 bool safety_emission(const struct safety *s);        // on was sent and off was not read back since
 bool safety_pending(const struct safety *s);         // an off that was not confirmed
 int64_t safety_worst_gap_ns(const struct safety *s); // between ticks, while emission was on

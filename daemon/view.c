@@ -18,7 +18,8 @@ json_t *view_run(const struct run *run, bool with_fit)
         json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id, "name",
                   run->name, "sample", run->sample, "file", run->path, "state",
                   run_state_name(run->state), "text", run->text, "sweep", run->sweep, "sweeps",
-                  run->sweeps, "done", run->done, "total", run->total, "emission", run->emission);
+                  run->sweeps, "done", run->done, "total", run->total, "emission",
+                  run->light == SAFETY_LIGHT_MAYBE);
     json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
     json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
     json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));

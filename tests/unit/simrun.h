@@ -138,6 +138,21 @@ static inline int port_event(void *ctx, const char *level, const char *source, c
     return 0;
 }
 
+// What is said of the light: off only when it is and that was read back, and a warning when it is on.
+static inline void check_words(struct run *r, const struct engine_event *event)
+{
+    struct instrument_snapshot s;
+    const bool warned = strstr(event->text, "LASER MAY BE ON"),
+               denied = strstr(event->text, "laser off");
+    instrument_snapshot(r->in, &s);
+    if (denied && (emits(r) || s.off_unconfirmed))
+        violate(r, "called off without knowing");
+    if (emits(r) && !warned)
+        violate(r, "light without a warning");
+    if (warned && !s.emission)
+        violate(r, "a warning without a reason");
+}
+
 static inline void port_publish(void *ctx, const struct engine_event *event)
 {
     struct run *r = ctx;
@@ -150,6 +165,8 @@ static inline void port_publish(void *ctx, const struct engine_event *event)
         return;
     r->state = event->state;
     r->states_count++;
+    if (at_rest(event->state) && event->state != RUN_QUEUED)
+        check_words(r, event);
     if (at_rest(event->state) && laser_reachable(r) && emits(r))
         violate(r, "laser on at rest");
     if (event->state == RUN_PAUSED) {

@@ -212,7 +212,11 @@ static void unplug_at_row_13(struct run *r)
 static void an_unplugged_device_pauses_by_name_and_resumes(void **state)
 {
     (void)state;
-    static const char *const names[] = {"axis theta_", "laser: unplugged", "detector: unplugged"};
+    static const char *const texts[] = {
+        "axis theta_i, axis theta_r, axis sample: unplugged; waiting for them to come back",
+        "LASER MAY BE ON: use its key or the interlock; laser: unplugged; waiting for it to come "
+        "back",
+        "detector: unplugged; waiting for it to come back"};
     for (unplug_which = 0; unplug_which < SIMBENCH_DEVICES; unplug_which++) {
         struct run *r = begin(NULL);
         r->auto_resume = false; // it must come back by itself
@@ -220,10 +224,87 @@ static void an_unplugged_device_pauses_by_name_and_resumes(void **state)
         assert_int_equal(go(r), RUN_DONE);
         assert_complete(r);
         assert_int_equal(r->pauses_count, 1);
-        assert_non_null(strstr(r->pauses[0], names[unplug_which]));
-        assert_non_null(strstr(r->pauses[0], "waiting for it to come back"));
+        assert_string_equal(r->pauses[0], texts[unplug_which]);
         end(r);
     }
+}
+
+static void unplug_laser_and_axes_at_row_13(struct run *r)
+{
+    if (r->rows != 13)
+        return;
+    unplug(r, SIMBENCH_LASER);
+    unplug(r, SIMBENCH_AXES);
+}
+
+static void all_that_is_unplugged_is_named_and_the_light_comes_first(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->auto_resume = false;
+    r->on_row = unplug_laser_and_axes_at_row_13;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_string_equal(r->pauses[0], "LASER MAY BE ON: use its key or the interlock; axis theta_i, "
+                                      "axis theta_r, axis sample, laser: unplugged; waiting for "
+                                      "them to come back");
+    end(r);
+}
+
+static void off_is_ignored_and_the_axes_go_at_row_7(struct run *r)
+{
+    if (r->rows != 7)
+        return;
+    r->b.world.laser.ignores_off = true;
+    r->b.gone_until_ns[SIMBENCH_AXES] = r->b.clk.t_ns + CLK_S(60);
+}
+
+static int offs_in_pause;
+
+static void count_offs(struct run *r)
+{
+    if (r->state == RUN_PAUSED && r->b.world.laser.ignores_off) {
+        offs_in_pause = r->b.offs;
+        if (r->b.clk.t_ns > r->b.gone_until_ns[SIMBENCH_AXES] - CLK_S(5))
+            r->b.world.laser.ignores_off = false;
+    }
+}
+
+static void an_off_is_repeated_also_while_others_are_waited_for(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->auto_resume = false;
+    r->on_row = off_is_ignored_and_the_axes_go_at_row_7;
+    r->on_time = count_offs;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_true(offs_in_pause > 200); // ten a second
+    end(r);
+}
+
+static void lose_laser_after_the_dark(struct run *r)
+{
+    if (r->rows == 1)
+        unplug(r, SIMBENCH_LASER);
+}
+
+static void stop_when_paused(struct run *r)
+{
+    cancel_request(r->cancel);
+}
+
+// check_words: neither "laser off" nor a warning without a reason.
+static void a_laser_lost_before_it_was_on_is_not_called_off(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_row = lose_laser_after_the_dark;
+    r->on_pause = stop_when_paused;
+    assert_int_equal(go(r), RUN_STOPPED);
+    assert_int_equal(r->b.ons, 0);
+    assert_non_null(strstr(r->pauses[0], "does not confirm that it is off"));
+    end(r);
 }
 
 // --- stopping and going on --------------------------------------------------------------------
@@ -553,6 +634,9 @@ int main(void)
         cmocka_unit_test(any_call_may_find_the_device_gone),
         cmocka_unit_test(any_call_may_find_a_fault),
         cmocka_unit_test(an_unplugged_device_pauses_by_name_and_resumes),
+        cmocka_unit_test(all_that_is_unplugged_is_named_and_the_light_comes_first),
+        cmocka_unit_test(an_off_is_repeated_also_while_others_are_waited_for),
+        cmocka_unit_test(a_laser_lost_before_it_was_on_is_not_called_off),
         cmocka_unit_test(a_stop_at_any_time_is_dark_within_a_second_and_can_be_resumed),
         cmocka_unit_test(a_cancel_before_the_start_turns_nothing_on),
         cmocka_unit_test(an_operators_pause_is_dark_until_resumed),

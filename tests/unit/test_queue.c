@@ -44,7 +44,7 @@ static void fit_run_(void *ctx, const struct run *run, int sweep, bool last)
 static void close_run(void *ctx, const struct run *run, enum run_state as)
 {
     (void)ctx;
-    say("close %d %d; ", run->id, as == RUN_DONE);
+    say("close %d %d%s%s; ", run->id, as == RUN_DONE, *run->text ? ":" : "", run->text);
 }
 
 static void cancel(void *ctx)
@@ -169,13 +169,42 @@ static void a_stop_empties_the_queue_and_waits_for_the_workers(void **state)
     queue_ended(q, 1, RUN_STOPPED, NULL);
     EXPECT("");
     queue_fitted(q, 1, NULL, &(struct gon_error){GON_E_CANCELED, "canceled"});
-    EXPECT("close 1 0; ");
+    EXPECT("close 1 0:stopped by uid 0; ");
     queue_closed(q, 1, NULL);
     EXPECT("rearm; 1=stopped:stopped by uid 0; ");
     assert_false(queue_stop(q, "nothing"));
     assert_int_equal(queue_submit(q, 1, NULL), 0); // and can go on later
     EXPECT("1=queued; open 1; ");
     queue_free(q);
+}
+
+// In the file as on the screen.
+static void a_laser_that_may_be_on_is_said_with_every_end(void **state)
+{
+    (void)state;
+    static const enum run_state ends[] = {RUN_STOPPED, RUN_DONE};
+    static const char *const why[] = {"; stopped by uid 0", ""};
+    for (int i = 0; i < 2; i++) {
+        char expected[300];
+        struct queue *q = make(1);
+        measure(q, 1);
+        if (ends[i] == RUN_STOPPED)
+            queue_stop(q, "stopped by uid 0");
+        *said = 0;
+        queue_engine_event(q, 1,
+                           &(struct engine_event){.kind = ENGINE_STATE,
+                                                  .state = ends[i],
+                                                  .light = SAFETY_LIGHT_MAYBE,
+                                                  .text = ""});
+        queue_ended(q, 1, ends[i], NULL);
+        queue_closed(q, 1, NULL);
+        const char *warning = "LASER MAY BE ON: use its key or the interlock";
+        snprintf(expected, sizeof expected, "close 1 %d:%s%s; %s1=%s:%s%s; ", ends[i] == RUN_DONE,
+                 warning, why[i], i == 0 ? "rearm; " : "", run_state_name(ends[i]), warning,
+                 why[i]);
+        EXPECT(expected);
+        queue_free(q);
+    }
 }
 
 static void a_stop_while_the_file_is_opened_still_stops(void **state)
@@ -198,7 +227,7 @@ static void failures_name_their_reason_and_the_next_run_begins(void **state)
     *said = 0;
     queue_ended(q, 1, RUN_FAILED, &(struct gon_error){GON_E_DEVICE, "axis theta_r: alarm 30"});
     queue_closed(q, 1, NULL);
-    EXPECT("close 1 0; 1=failed:axis theta_r: alarm 30; open 2; ");
+    EXPECT("close 1 0:axis theta_r: alarm 30; 1=failed:axis theta_r: alarm 30; open 2; ");
     queue_opened(q, 2, NULL, &(struct gon_error){GON_E_STORE, "in use by pid 7"});
     EXPECT("2=failed:in use by pid 7; ");
     queue_free(q);
@@ -225,6 +254,7 @@ int main(void)
         cmocka_unit_test(runs_wait_for_each_other),
         cmocka_unit_test(what_cannot_be_queued_is_refused),
         cmocka_unit_test(a_stop_empties_the_queue_and_waits_for_the_workers),
+        cmocka_unit_test(a_laser_that_may_be_on_is_said_with_every_end),
         cmocka_unit_test(a_stop_while_the_file_is_opened_still_stops),
         cmocka_unit_test(failures_name_their_reason_and_the_next_run_begins),
         cmocka_unit_test(a_failed_fit_is_remembered_until_a_later_one_succeeds),
