@@ -11,6 +11,7 @@ import queue
 import shutil
 import signal
 import socket
+import sqlite3
 import subprocess
 import tempfile
 import threading
@@ -33,6 +34,17 @@ campaign: {
   readings: { count = 2; };
 };
 """
+
+
+def query(file, sql):
+    """Rows of a campaign file, whoever was killed while it was written: not mode=ro, which cannot take a
+    killed writer's transaction back."""
+    db = sqlite3.connect(file)
+    try:
+        db.execute("pragma query_only = 1")
+        return db.execute(sql).fetchall()
+    finally:
+        db.close()
 
 
 class Program:

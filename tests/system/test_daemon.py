@@ -5,13 +5,12 @@ import math
 import os
 import select
 import signal
-import sqlite3
 import subprocess
 import time
 
 import pytest
 
-from conftest import BUILD, PATIENCE_S, QUICK_LASER, SMALL, Program
+from conftest import BUILD, PATIENCE_S, QUICK_LASER, SMALL, Program, query
 
 TINY = """\
 campaign: {
@@ -84,8 +83,7 @@ def test_list_and_show_read_the_file(daemon, finished):
     assert len(table) == len(by_path) + 1
     assert daemon.gonio("show", finished["run"]).returncode == 0
     assert daemon.gonio("show", finished["run"], "--sweep", 99).returncode == 2
-    with sqlite3.connect(f"file:{run['file']}?mode=ro", uri=True) as db:
-        assert db.execute("select count(*) from reading_brdf").fetchone()[0] >= 90
+    assert query(run["file"], "select count(*) from reading_brdf")[0][0] >= 90
 
 
 def test_fit_of_the_file_is_the_daemons_fit(daemon, finished):
@@ -149,9 +147,8 @@ def test_stop_and_resume_measure_no_point_twice(daemon):
     stream.until(lambda e: e["event"] == "reading" and e["done"] > entry["done"])
     stream.until_state(run, "done", patience_s=90)
     stream.close()
-    with sqlite3.connect(f"file:{reply['file']}?mode=ro", uri=True) as db:
-        rows = db.execute("select sweep, point, flags from reading").fetchall()
-        plan = db.execute("select count(*) from plan").fetchone()[0]
+    rows = query(reply["file"], "select sweep, point, flags from reading")
+    plan = query(reply["file"], "select count(*) from plan")[0][0]
     accepted = [(s, p) for s, p, flags in rows if flags == 0]
     assert len(accepted) == len(set(accepted)) == plan == entry["total"]
 

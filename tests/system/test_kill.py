@@ -6,12 +6,11 @@ import json
 import os
 import random
 import signal
-import sqlite3
 import time
 
 import pytest
 
-from conftest import Daemon
+from conftest import Daemon, query
 
 PLAN = """\
 campaign: {
@@ -27,8 +26,7 @@ CAMPAIGNS, KILLS = 4, 5
 
 
 def rows(path):
-    with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as db:
-        return db.execute("select sweep, point, attempt, flags from reading").fetchall()
+    return query(path, "select sweep, point, attempt, flags from reading")
 
 
 @pytest.mark.parametrize("campaign", range(CAMPAIGNS))
@@ -69,8 +67,7 @@ def test_no_acknowledged_reading_is_lost_when_killed(start_sim, tmp_path, campai
             accepted[(sweep, point)] = accepted.get((sweep, point), 0) + 1
     repeated = sum(n - 1 for n in accepted.values())
     assert repeated == 0, "an accepted point is never measured again"
-    with sqlite3.connect(f"file:{file}?mode=ro", uri=True) as db:
-        planned = set(db.execute("select sweep, point from plan").fetchall())
+    planned = set(query(file, "select sweep, point from plan"))
     assert set(accepted) == planned
     shown = json.loads(Daemon.gonio(d, "show", run, "--json").stdout)
     assert shown["state"] == "done"

@@ -665,6 +665,44 @@ static void killed_writers_lose_no_acknowledged_row(void **state)
     }
 }
 
+// A child that dies with a transaction half in the file: its rollback journal is left, as a kill
+// leaves it while the file goes to WAL or back.
+static void leave_a_hot_journal(void)
+{
+    pid_t child = fork();
+    if (child == 0) {
+        sqlite3 *db;
+        const char *sql = "PRAGMA cache_size = 5; BEGIN; CREATE TABLE half (x);"
+                          "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000)"
+                          " INSERT INTO half SELECT randomblob(400) FROM n";
+        _exit(sqlite3_open(path, &db) || sqlite3_exec(db, sql, NULL, NULL, NULL));
+    }
+    int status;
+    waitpid(child, &status, 0);
+    assert_int_equal(status, 0);
+}
+
+static void a_reader_recovers_what_a_killed_writer_left(void **state)
+{
+    (void)state;
+    struct store_reading r = reading(1, 1, 1), *rows;
+    char journal[160];
+    struct stat st;
+    struct store *s = created();
+    append(s, &r);
+    store_close(s, NULL);
+    leave_a_hot_journal();
+    snprintf(journal, sizeof journal, "%s-journal", path);
+    assert_int_equal(stat(journal, &st), 0);
+    assert_true(st.st_size > 0);
+    s = opened(STORE_READ);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 1);
+    assert_int_equal(store_row_crc(&rows[0]), store_row_crc(&r));
+    free(rows);
+    store_close(s, NULL);
+    assert_int_equal(stat(journal, &st), -1);
+}
+
 // 240 bytes a reading are promised; measured on 10,000 rows as they are in a campaign.
 static void readings_are_small(void **state)
 {
@@ -774,6 +812,7 @@ int main(void)
         TEST(anothers_write_lock_is_waited_for_then_named),
         TEST(a_full_disk_loses_nothing_that_was_acknowledged),
         TEST(killed_writers_lose_no_acknowledged_row),
+        TEST(a_reader_recovers_what_a_killed_writer_left),
         TEST(readings_are_small),
         TEST(events_and_states_are_a_history),
         TEST(network_file_systems_are_known),
