@@ -4,34 +4,45 @@
 #include "base/clk.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 struct deadline {
     double seconds;
-    const char *text;
+    _Atomic(const char *) words; // the one thing that crosses threads here besides the cancel token
     int status;
 };
 
 static void *wait_and_end(void *ctx)
 {
-    const struct deadline *d = ctx;
+    struct deadline *d = ctx;
     clk_sleep(clk_system(), CLK_S(d->seconds), NULL);
-    ssize_t n = write(STDERR_FILENO, d->text, strlen(d->text));
+    const char *words = atomic_load(&d->words);
+    ssize_t n = write(STDERR_FILENO, words, strlen(words));
     (void)n;
     _exit(d->status);
 }
 
-void deadline_set(double seconds, const char *text, int status)
+struct deadline *deadline_set(double seconds, const char *words, int status)
 {
     struct deadline *d = malloc(sizeof *d);
     pthread_t thread;
     if (!d)
-        return;
-    *d = (struct deadline){seconds, text, status};
-    if (pthread_create(&thread, NULL, wait_and_end, d))
+        return NULL;
+    *d = (struct deadline){.seconds = seconds, .status = status};
+    atomic_init(&d->words, words);
+    if (pthread_create(&thread, NULL, wait_and_end, d)) {
         free(d);
-    else
-        pthread_detach(thread);
+        return NULL;
+    }
+    pthread_detach(thread);
+    return d;
+}
+
+void deadline_say(struct deadline *d, const char *words)
+{
+    if (d)
+        atomic_store(&d->words, words);
 }

@@ -57,16 +57,9 @@ static void answer_stops(struct hub *h, int status, const char *body)
     h->stop_count = 0;
 }
 
-// Read back off by a laser that can be reached; nothing else may be called off.
-static bool laser_is_off(const struct hub *h)
-{
-    const struct instrument_snapshot *s = h->snapshot;
-    return s && s->part[PART_LASER].link == PART_OK && !s->emission && !s->off_unconfirmed;
-}
-
 static void answer_stopped(struct hub *h, int status, json_t *o)
 {
-    json_object_set_new(o, "laser_off", json_boolean(laser_is_off(h)));
+    json_object_set_new(o, "laser_off", json_boolean(h->snapshot && instrument_is_dark(h->snapshot)));
     char *body = view_text(o);
     answer_stops(h, status, body);
     free(body);
@@ -324,6 +317,8 @@ static void take_snapshot(struct hub *h, struct note *n)
 {
     free(h->snapshot);
     h->snapshot = note_steal(n);
+    if (h->snapshot)
+        h->options.looked(h->options.ctx, h->snapshot);
 }
 
 static void engine_ended(struct hub *h, const struct note *n)

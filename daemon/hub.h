@@ -25,6 +25,8 @@ struct hub_options {
     struct log *log;
     // Once, when the bench was looked at.
     void (*ready)(void *ctx, const struct instrument_snapshot *s);
+    // Each time it was looked at, about twice a second.
+    void (*looked)(void *ctx, const struct instrument_snapshot *s);
     // The workers are idle; err: why it could not go on.
     void (*ended)(void *ctx, const struct gon_error *err);
     void *ctx;

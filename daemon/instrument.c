@@ -304,12 +304,12 @@ int instrument_open(const struct bench_config *bench, struct clk *clk,
     return hand_over(in, ret_instrument, err);
 }
 
-void instrument_free(struct instrument *in)
+bool instrument_free(struct instrument *in)
 {
     if (!in)
-        return;
+        return true;
     in->watcher = NULL;
-    safety_free(in->safety);
+    const bool dark = safety_free(in->safety);
     in->safety = NULL;
     for (int i = 0; i < INSTRUMENT_AXES; i++)
         if (in->motor[i].axis) {
@@ -321,6 +321,7 @@ void instrument_free(struct instrument *in)
     if (in->detector)
         in->detector->ops->free(in->detector);
     free(in);
+    return dark;
 }
 
 const struct bench_config *instrument_bench(const struct instrument *in)
@@ -353,6 +354,12 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
         s->axis[i].alarm = m->place.alarm;
         s->axis[i].alarm_code = m->place.alarm_code;
     }
+}
+
+bool instrument_is_dark(const struct instrument_snapshot *s)
+{
+    return s->part[PART_LASER].link == PART_OK && !s->emission && !s->off_unconfirmed &&
+           !s->laser.emission;
 }
 
 // --- an instrument that runs nothing ----------------------------------------------------------

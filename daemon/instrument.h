@@ -81,10 +81,13 @@ int instrument_open(const struct bench_config *bench, struct clk *clk,
                     struct instrument **ret_instrument, struct gon_error *err);
 int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts,
                    struct clk *clk, struct instrument **ret_instrument, struct gon_error *err);
-void instrument_free(struct instrument *in); // laser off and axes stopped first
+// Laser off and axes stopped first. False when a laser that was reached before did not confirm OFF.
+bool instrument_free(struct instrument *in);
 
 const struct bench_config *instrument_bench(const struct instrument *in);
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot);
+// Read back off by a laser that can be reached; nothing else may be called off. Any thread.
+bool instrument_is_dark(const struct instrument_snapshot *s);
 // Called between slices of every wait, on the instrument thread: at most 100 ms apart while the
 // engine waits. It must be quick and must not call back into the instrument, except
 // instrument_snapshot.

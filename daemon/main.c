@@ -46,6 +46,8 @@ static const struct option_row rows[] = {
 };
 
 #define END_S 4.5 // from the signal, whatever hangs
+#define ENDED_ALL_THE_SAME                                                                         \
+    "goniod: a device or the disk does not answer; ended all the same. Readings are safe. "
 
 struct daemon {
     struct options options;
@@ -57,7 +59,9 @@ struct daemon {
     char *bench_text;
     char socket[200], directory[4096];
     struct hub *hub;
-    int status; // exit status
+    struct deadline *deadline; // NULL: not ending yet
+    bool dark;                 // the laser, when the bench was last looked at
+    int status;                // exit status
 };
 
 static int say_error(const struct gon_error *err)
@@ -108,16 +112,26 @@ static void print_help(void)
 
 // --- callbacks of the loop -----------------------------------------------------------------------
 
+static const char *last_words(bool dark)
+{
+    return dark ? ENDED_ALL_THE_SAME "The laser is off\n"
+                : ENDED_ALL_THE_SAME "LASER MAY BE ON: use its key or the interlock\n";
+}
+
+static void looked(void *ctx, const struct instrument_snapshot *s)
+{
+    struct daemon *d = ctx;
+    d->dark = instrument_is_dark(s);
+    deadline_say(d->deadline, last_words(d->dark));
+}
+
 static void signaled(void *ctx, int signal)
 {
     struct daemon *d = ctx;
     log_say(d->log, LOG_NOTICE, "goniod", "signal %d: laser off, axes stopped, then the end",
             signal);
-    deadline_set(
-        END_S,
-        "goniod: a device or the disk does not answer; ended all the same. Readings are safe. "
-        "LASER MAY BE ON if it was: use its key or the interlock\n",
-        1);
+    if (!d->deadline)
+        d->deadline = deadline_set(END_S, last_words(d->dark), 1);
     hub_end(d->hub);
 }
 
@@ -154,12 +168,11 @@ static void ready(void *ctx, const struct instrument_snapshot *s)
     for (int i = 0; i < PART_COUNT; i++)
         if (s->part[i].link == PART_LOST)
             printf("waiting for %s: %s\n", s->part[i].name, s->part[i].problem);
-    bool lost = s->part[PART_LASER].link != PART_OK,
-         on = s->emission || s->off_unconfirmed || s->laser.emission;
+    bool lost = s->part[PART_LASER].link != PART_OK;
     printf("ready: axes %s, laser %s.   Ctrl-C stops (laser off first).\n", axes_text(s),
-           lost ? "not reachable"
-           : on ? "NOT OFF: use its key or the interlock"
-                : "off");
+           lost                    ? "not reachable"
+           : instrument_is_dark(s) ? "off"
+                                   : "NOT OFF: use its key or the interlock");
     fflush(stdout);
 }
 
@@ -240,6 +253,7 @@ static int open_hub(struct daemon *d, struct gon_error *err)
         .seed = d->options.seed,
         .log = d->log,
         .ready = ready,
+        .looked = looked,
         .ended = ended,
         .ctx = d,
     };

@@ -242,6 +242,7 @@ static void idle(struct runner *r)
         int64_t now_ns = clk_now_ns(clk_system());
         if (r->start) {
             run(r);
+            tend_ns = clk_now_ns(clk_system()) + CLK_MS(IDLE_MS); // an end that waits goes first
         } else if (r->halt) {
             halt(r);
         } else if (now_ns >= tend_ns) {
@@ -255,18 +256,6 @@ static void idle(struct runner *r)
                 take(r, n);
         }
     }
-}
-
-// One more try at a laser that was not read back off.
-static bool light_left(struct instrument *in)
-{
-    struct instrument_snapshot s;
-    instrument_snapshot(in, &s);
-    if (!s.emission && !s.off_unconfirmed)
-        return false;
-    instrument_emission_off(in, NULL);
-    instrument_snapshot(in, &s);
-    return s.emission || s.off_unconfirmed;
 }
 
 static void *thread_main(void *ctx)
@@ -283,8 +272,7 @@ static void *thread_main(void *ctx)
     instrument_watch(r->in, watch, r);
     idle(r);
     note_free(r->start);
-    r->may_be_on = light_left(r->in);
-    instrument_free(r->in); // laser off, axes stopped
+    r->may_be_on = !instrument_free(r->in); // laser off, axes stopped
     return NULL;
 }
 

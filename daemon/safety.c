@@ -24,13 +24,14 @@ struct safety *safety_new(struct laser *laser, struct clk *clk)
     return s;
 }
 
-void safety_free(struct safety *s)
+bool safety_free(struct safety *s)
 {
     if (!s)
-        return;
-    safety_off(s, NULL);
+        return true;
+    const bool dark = safety_off(s, NULL) >= 0;
     s->laser->ops->free(s->laser);
     free(s);
+    return dark;
 }
 
 int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error *err)

@@ -34,7 +34,8 @@ enum safety_light {
 
 // Takes over laser, also when it fails (then the laser is freed). NULL without memory.
 struct safety *safety_new(struct laser *laser, struct clk *clk);
-void safety_free(struct safety *s); // off first, as well as the link allows
+// Off first, as well as the link allows; false when it was not read back. NULL is fine.
+bool safety_free(struct safety *s);
 
 // First contact, and after every reopening: off with read back, then who it is. ret_text may be
 // NULL.

@@ -57,6 +57,18 @@ def test_a_stop_never_says_off_of_a_laser_that_is_unplugged(measuring):
     assert "LASER MAY BE ON" in daemon.errors()
 
 
+def test_a_second_stop_says_it_too(measuring):
+    sim, daemon, _, _ = measuring
+    sim.control(do="set", ignore_off=True)
+    assert daemon.gonio("stop").returncode == 1
+    status, reply = daemon.request("POST", "/api/v1/stop")[:2]
+    assert status == 500 and reply["laser_off"] is False and "LASER MAY BE ON" in reply["error"], reply
+    again = daemon.gonio("stop")
+    assert again.returncode == 1 and "LASER MAY BE ON" in again.stderr, again.stderr
+    sim.control(do="set", ignore_off=False)
+    assert daemon.end() == 0
+
+
 def ends_in_time(daemon):
     begun = time.monotonic()
     status = daemon.end(signal.SIGTERM, patience_s=20)
@@ -68,7 +80,7 @@ def test_sigterm_ends_it_when_the_laser_ignores_off(measuring):
     sim, daemon, _, _ = measuring
     sim.control(do="set", ignore_off=True)
     assert ends_in_time(daemon) == 1
-    assert "LASER MAY BE ON" in daemon.errors()
+    assert "LASER MAY BE ON" in daemon.errors() and "ended all the same" not in daemon.errors()
 
 
 def test_sigterm_ends_it_when_every_device_is_frozen(measuring):
@@ -85,4 +97,5 @@ def test_sigterm_ends_it_when_the_campaign_file_is_locked(measuring):
         ends_in_time(daemon)
         db.execute("rollback")
     assert not sim.control(do="state")["laser"]["emission"], "off before the end"
+    assert "LASER MAY BE ON" not in daemon.errors() and "The laser is off" in daemon.errors()
     assert db.execute("pragma quick_check").fetchone() == ("ok",)
