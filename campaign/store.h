@@ -16,7 +16,8 @@
 //   int32 sweep, point, attempt; int64 t_utc_ms; int32 theta_i_udeg, theta_r_udeg; float64
 //   signal_v, signal_sd_v, monitor_v, monitor_sd_v (NULL is the quiet NaN 0x7ff8000000000000);
 //   int32 count, range; uint32 flags.
-// A row that fails it is an error that names sweep and point, whenever it is read.
+// A row that fails it is an error that names sweep and point, whenever it is read. The plan, the
+// configuration and the bench have one check value each (meta: plan_crc32c, ...).
 #pragma once
 #include "base/err.h"
 #include "campaign/config.h"

@@ -44,4 +44,8 @@ void store_db_bind_text(sqlite3_stmt *statement, int index,
 
 // campaign/store_schema.c
 extern const char store_schema_sql[];
+// Check value of the whole plan, which meta keeps as plan_crc32c (8 hexadecimal digits): CRC-32C of
+// every column of every row in order; integers and reals as 8 little-endian bytes, texts with their
+// final NUL.
+int store_plan_crc(struct store *s, uint32_t *ret_crc, struct gon_error *err);
 int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err);

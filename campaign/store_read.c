@@ -81,11 +81,31 @@ static void mark_done(struct plan *p, const struct store_reading *rows, int coun
     }
 }
 
+static int check_plan(struct store *s, struct gon_error *err)
+{
+    uint32_t crc;
+    char text[16];
+    int rc = store_plan_crc(s, &crc, err);
+    if (rc < 0)
+        return rc;
+    snprintf(text, sizeof text, "%08x", crc);
+    char *wanted = store_read_meta(s, "plan_crc32c");
+    if (!wanted || strcmp(text, wanted))
+        rc = gon_fail(err, GON_E_STORE,
+                      "%s: the plan kept in it is damaged (its check value is wrong); restore the "
+                      "file from a copy",
+                      s->path);
+    free(wanted);
+    return rc;
+}
+
 int store_read_plan(struct store *s, struct plan *ret_plan, struct gon_error *err)
 {
     struct plan p = {.duration_s = (double)NAN};
     struct store_reading *rows = NULL;
-    int rc = read_points(s, &p, err);
+    int rc = check_plan(s, err);
+    if (rc >= 0)
+        rc = read_points(s, &p, err);
     if (rc >= 0 && p.count == 0)
         rc = gon_fail(err, GON_E_STORE, "%s: has no plan", s->path);
     int count = rc >= 0 ? store_read_readings(s, -1, &rows, err) : rc;

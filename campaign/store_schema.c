@@ -168,6 +168,53 @@ static int put_point(struct store *s, const struct store_new *what, const struct
     return store_db_finish(s, q, err);
 }
 
+static uint32_t column_crc(uint32_t crc, sqlite3_stmt *q, int column)
+{
+    const int type = sqlite3_column_type(q, column);
+    if (type == SQLITE_TEXT) {
+        const unsigned char *text = sqlite3_column_text(q, column);
+        return crc32c(crc, text, (size_t)sqlite3_column_bytes(q, column) + 1);
+    }
+    unsigned char bytes[8];
+    uint64_t bits = (uint64_t)sqlite3_column_int64(q, column);
+    const double value = sqlite3_column_double(q, column);
+    if (type == SQLITE_FLOAT)
+        memcpy(&bits, &value, sizeof bits);
+    for (int i = 0; i < 8; i++)
+        bytes[i] = (unsigned char)(bits >> (8 * i));
+    return crc32c(crc, bytes, sizeof bytes);
+}
+
+int store_plan_crc(struct store *s, uint32_t *ret_crc, struct gon_error *err)
+{
+    sqlite3_stmt *q;
+    uint32_t crc = 0;
+    int step, rc = store_db_prepare(s, "SELECT * FROM plan ORDER BY sweep, point", &q, err);
+    if (rc < 0)
+        return rc;
+    while ((step = sqlite3_step(q)) == SQLITE_ROW)
+        for (int i = 0; i < sqlite3_column_count(q); i++)
+            crc = column_crc(crc, q, i);
+    rc = step == SQLITE_DONE ? GON_OK : store_db_fail(s, err);
+    sqlite3_finalize(q);
+    if (rc >= 0)
+        *ret_crc = crc;
+    return rc;
+}
+
+static int put_plan(struct store *s, const struct store_new *what, struct gon_error *err)
+{
+    char text[16];
+    uint32_t crc = 0;
+    int rc = GON_OK;
+    for (int i = 0; i < what->plan->count && rc >= 0; i++)
+        rc = put_point(s, what, &what->plan->points[i], err);
+    if (rc >= 0)
+        rc = store_plan_crc(s, &crc, err);
+    snprintf(text, sizeof text, "%08x", crc);
+    return rc >= 0 ? put_text(s, "plan_crc32c", text, err) : rc;
+}
+
 int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err)
 {
     char pragmas[120];
@@ -181,7 +228,7 @@ int store_write_new(struct store *s, const struct store_new *what, struct gon_er
         rc = store_db_run(s, store_schema_sql, err);
     if (rc >= 0)
         rc = put_meta(s, what, err);
-    for (int i = 0; i < what->plan->count && rc >= 0; i++)
-        rc = put_point(s, what, &what->plan->points[i], err);
+    if (rc >= 0)
+        rc = put_plan(s, what, err);
     return store_db_end(s, rc, err);
 }

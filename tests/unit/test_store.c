@@ -367,6 +367,27 @@ static void damage_is_named_and_nothing_is_recreated(void **state)
     assert_non_null(strstr(err.text, "keep the file"));
 }
 
+static void a_changed_plan_is_noticed(void **state)
+{
+    (void)state;
+    static const char *const changes[] = {
+        "UPDATE plan SET weight = 2 WHERE sweep = 1 AND point = 2",
+        "UPDATE plan SET pol_in = 's' WHERE sweep = 1 AND point = 2",
+        "UPDATE plan SET theta_r_udeg = theta_r_udeg + 1 WHERE sweep = 2 AND point = 0",
+        "DELETE FROM plan WHERE sweep = 3 AND point = 1"};
+    for (size_t i = 0; i < sizeof changes / sizeof *changes; i++) {
+        struct plan plan;
+        struct gon_error err;
+        store_close(created(), NULL);
+        tamper(changes[i]);
+        struct store *s = opened(STORE_READ);
+        assert_int_equal(store_read_plan(s, &plan, &err), GON_E_STORE);
+        assert_non_null(strstr(err.text, "the plan kept in it is damaged"));
+        store_close(s, NULL);
+        assert_int_equal(unlink(path), 0);
+    }
+}
+
 // Where no reading lies: only a check of the whole file sees it.
 static void damage_elsewhere_is_seen_before_anything_is_written(void **state)
 {
@@ -803,6 +824,7 @@ int main(void)
         TEST(a_second_writer_is_refused_and_told_who),
         TEST(a_new_file_never_replaces_one),
         TEST(damage_is_named_and_nothing_is_recreated),
+        TEST(a_changed_plan_is_noticed),
         TEST(damage_elsewhere_is_seen_before_anything_is_written),
         TEST(a_failed_fsync_reopens_before_the_next_row),
         TEST(readings_cannot_be_changed_by_accident),
