@@ -6,6 +6,7 @@
 #include "campaign/config.h"
 #include "cli/out.h"
 #include "cli/verb.h"
+#include "drivers/link.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -54,14 +55,57 @@ int check_campaign(const char *path, struct campaign_config *ret_config, char **
     return EXIT_INPUT;
 }
 
+// --- links: campaign/ keeps them as text, drivers/ knows what they may say ----------------------
+
+static int line_of(const char *text, const char *word)
+{
+    const char *at = strstr(text, word);
+    int line = 1;
+    for (const char *p = text; at && p < at; p++)
+        line += *p == '\n';
+    return line;
+}
+
+static int check_link(const char *path, const char *text, const char *link, enum link_use use,
+                      struct cfg_sink sink)
+{
+    struct link l;
+    struct gon_error err;
+    char line[800];
+    int rc = link_parse(link, use, &l, &err);
+    if (rc >= 0)
+        return 0;
+    snprintf(line, sizeof line, "%s:%d: %s", path, line_of(text, link), err.text);
+    sink.say(sink.ctx, line);
+    return rc;
+}
+
+static int load_bench(const char *path, struct bench_config *bench, struct cfg_sink sink)
+{
+    char *text;
+    int rc = bench_config_load(path, sink, bench, &text), worst;
+    if (rc < 0)
+        return rc;
+    worst = check_link(path, text, bench->laser.link, LINK_TEXT, sink);
+    for (int i = 0; i < bench->buses_count; i++)
+        if ((rc = check_link(path, text, bench->buses[i].link, LINK_MODBUS, sink)) < 0)
+            worst = rc;
+    if ((rc = check_link(path, text, bench->detector.link, LINK_TEXT, sink)) < 0)
+        worst = rc;
+    free(text);
+    return worst;
+}
+
 int check_bench(const char *path, struct bench_config *ret_bench)
 {
     struct complaints c = {NULL, 0};
-    if (bench_config_load(path, (struct cfg_sink){complain, &c}, ret_bench, NULL) == 0)
+    if (load_bench(path, ret_bench, (struct cfg_sink){complain, &c}) == 0)
         return EXIT_OK;
     say_count(c.count, "nothing started.");
     return EXIT_INPUT;
 }
+
+// --- what kind of file it is --------------------------------------------------------------------
 
 // A campaign file has a group "campaign", a bench file one "bench".
 static bool has_group(const char *text, const char *name)
@@ -128,9 +172,9 @@ static int run_check(const struct verb *verb, int argc, char **argv)
     struct cfg_sink sink = {complain, &c};
     struct campaign_config *campaign = malloc(sizeof *campaign);
     struct bench_config *bench = malloc(sizeof *bench);
-    int rc = !campaign || !bench                 ? GON_E_SYSTEM
+    int rc = !campaign || !bench         ? GON_E_SYSTEM
              : !strcmp(kind, "campaign") ? campaign_config_load(path, sink, campaign, NULL)
-                                                 : bench_config_load(path, sink, bench, NULL);
+                                         : load_bench(path, bench, sink);
     free(campaign);
     free(bench);
     if (o.json) {

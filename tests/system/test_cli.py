@@ -116,6 +116,17 @@ def test_check_knows_campaign_and_bench(tmp_path):
     assert gonio("check", "--settings", "x").returncode == 2
 
 
+def test_check_reads_the_links(tmp_path):
+    text = (ROOT / "configs" / "goniod.cfg").read_text()
+    changed = text.replace("baud=115200\"", "baud=-1\"").replace("baud=19200", "baut=1").replace("parity=E", "parity=X")
+    r = gonio("check", write(tmp_path / "b.cfg", changed))
+    lines = r.stderr.splitlines()
+    assert r.returncode == 2 and len(lines) == 4, r.stderr
+    for line, number, wrong in ((lines[0], 27, "baud=-1"), (lines[1], 13, "parity=X"), (lines[2], 33, "baut=1")):
+        assert f"b.cfg:{number}:" in line and f"'{wrong}'" in line, line
+    assert gonio("check", write(tmp_path / "b.cfg", text)).returncode == 0
+
+
 def fit_json(*args):
     r = gonio("fit", *args, "--json")
     assert r.returncode == 0, r.stderr
