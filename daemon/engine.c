@@ -17,7 +17,6 @@
 #include <string.h>
 
 #define ATTEMPTS_MORE 3  // attempts at a point: the ranges and these
-#define RETURNS_MOST 5   // pauses that ended by themselves, without a reading between them
 #define MONITOR_LOST 0.5 // of the monitor after warm-up: below it the light is lost
 #define AGAIN 1          // not done, but nothing is wrong
 #define STORE_RETRY_NS CLK_S(1)
@@ -82,7 +81,7 @@ void engine_say(struct engine *e, enum engine_event_kind kind, const char *level
     e->ports->publish(e->ports->ctx, &event);
 }
 
-static void enter(struct engine *e, enum run_state state, const char *text)
+void engine_enter(struct engine *e, enum run_state state, const char *text)
 {
     const bool bad = state == RUN_PAUSED || state == RUN_FAILED;
     char row[640];
@@ -93,155 +92,6 @@ static void enter(struct engine *e, enum run_state state, const char *text)
     e->ports->store_event(e->ports->ctx, bad ? "warn" : "notice", "engine", row, NULL);
     const struct engine_event event = event_of(e, ENGINE_STATE, text);
     e->ports->publish(e->ports->ctx, &event);
-}
-
-// --- the safe state, and waiting in it --------------------------------------------------------
-
-static int canceled(struct engine *e)
-{
-    return gon_fail(&e->why, GON_E_CANCELED, "stopped");
-}
-
-int engine_nap(struct engine *e, int64_t ns)
-{
-    return instrument_wait(e->in, clk_now_ns(e->ports->clk) + ns, e->ports->cancel) < 0
-               ? canceled(e)
-               : 0;
-}
-
-static const char *light_text(const struct engine *e)
-{
-    return safety_light_text(instrument_light_left(e->in));
-}
-
-static void make_safe(struct engine *e)
-{
-    struct gon_error err;
-    const bool was_on = instrument_light_left(e->in) == SAFETY_LIGHT_MAYBE;
-    e->ready = e->lit = e->dark = false;
-    instrument_permit(e->in, false);
-    if (instrument_emission_off(e->in, &err) < 0 && was_on)
-        engine_say(e, ENGINE_LOG, "err", "%s", err.text);
-    travel_stop(e->in, NULL);
-}
-
-static bool resume_asked(struct engine *e)
-{
-    return e->ports->take_resume(e->ports->ctx);
-}
-
-bool engine_pause_asked(struct engine *e)
-{
-    return e->ports->take_pause && e->ports->take_pause(e->ports->ctx);
-}
-
-int engine_operator_paused(struct engine *e)
-{
-    return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
-}
-
-static int next_lost(const struct instrument_snapshot *s, int part)
-{
-    while (part < PART_COUNT && s->part[part].link != PART_LOST)
-        part++;
-    return part;
-}
-
-// "axis theta_i, axis theta_r (rtu://...), laser (serial://...)", an address once for those that
-// share it. Returns how many are lost.
-static int name_lost(const struct engine *e, char *text, size_t size)
-{
-    struct instrument_snapshot s;
-    size_t length = 0;
-    int lost = 0;
-    instrument_snapshot(e->in, &s);
-    *text = 0;
-    for (int i = next_lost(&s, 0), next; i < PART_COUNT && length < size; i = next) {
-        const struct part_state *p = &s.part[i];
-        next = next_lost(&s, i + 1);
-        const bool shared = next < PART_COUNT && !strcmp(p->address, s.part[next].address);
-        const bool told = *p->address && !shared;
-        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s",
-                                   lost++ ? ", " : "", i < INSTRUMENT_AXES ? "axis " : "", p->name,
-                                   told ? " (" : "", told ? p->address : "", told ? ")" : "");
-    }
-    return lost;
-}
-
-static void describe_loss(const struct engine *e, char *text, size_t size)
-{
-    char names[360];
-    const int lost = name_lost(e, names, sizeof names);
-    if (e->why.code == GON_E_GONE && lost > 0)
-        snprintf(text, size, "%s: unplugged; waiting for %s to come back", names,
-                 lost == 1 ? "it" : "them");
-    else
-        snprintf(text, size, "%.400s; trying again", e->why.text);
-}
-
-// The warning comes first: whoever reads half of the line has read it.
-static void enter_pause(struct engine *e, const char *text)
-{
-    char whole[640];
-    const bool off = instrument_light_left(e->in) == SAFETY_LIGHT_OFF;
-    snprintf(whole, sizeof whole, "%s%s%s", off ? "" : light_text(e), off ? "" : "; ", text);
-    enter(e, RUN_PAUSED, whole);
-}
-
-static int wait_for_operator(struct engine *e)
-{
-    int64_t tend_ns = 0;
-    while (!resume_asked(e)) {
-        if (engine_nap(e, CLK_MS(100)) < 0)
-            return GON_E_CANCELED;
-        if (clk_now_ns(e->ports->clk) >= tend_ns) {
-            instrument_tend(e->in);
-            tend_ns = clk_now_ns(e->ports->clk) + CLK_S(1);
-        }
-    }
-    return 0;
-}
-
-// Until every device is back, or an operator took the pause over.
-static int wait_for_devices(struct engine *e)
-{
-    do {
-        if (engine_pause_asked(e)) {
-            enter_pause(e, "paused by the operator; go on with: gonio resume");
-            return wait_for_operator(e);
-        }
-        (void)resume_asked(e); // it goes on by itself anyway
-        if (engine_nap(e, CLK_MS(100)) < 0)
-            return GON_E_CANCELED;
-    } while (instrument_reconnect(e->in) > 0);
-    return 0;
-}
-
-// Emission off, axes stopped, and what is to be done depends on what happened (e->why). 0: go on.
-static int pause_run(struct engine *e)
-{
-    const enum run_state before = e->state;
-    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
-    char text[600];
-    int rc;
-    make_safe(e);
-    if (cancel_requested(e->ports->cancel))
-        return canceled(e);
-    if (by_itself && e->returns < RETURNS_MOST) {
-        e->returns++;
-        describe_loss(e, text, sizeof text);
-        enter_pause(e, text);
-        rc = wait_for_devices(e);
-    } else {
-        snprintf(text, sizeof text, "%.440s%s", e->why.text,
-                 by_itself ? "; it keeps failing: look at it, then: gonio resume" : "");
-        enter_pause(e, text);
-        rc = wait_for_operator(e);
-        e->returns = 0;
-    }
-    if (rc >= 0)
-        enter(e, before, by_itself ? "everything is there again; going on" : "resumed");
-    return rc;
 }
 
 // --- storing ----------------------------------------------------------------------------------
@@ -257,16 +107,16 @@ static int store(struct engine *e, const struct store_reading *row)
     char text[600];
     snprintf(text, sizeof text, "store: %.400s; the reading is kept and offered again each second",
              e->why.text);
-    make_safe(e);
-    enter_pause(e, text);
+    engine_make_safe(e);
+    engine_enter_pause(e, text);
     while (rc == GON_E_STORE) {
         instrument_wait(e->in, clk_now_ns(e->ports->clk) + STORE_RETRY_NS, e->ports->cancel);
         rc = e->ports->store_reading(e->ports->ctx, row, &e->why);
         if (rc == GON_E_STORE && cancel_requested(e->ports->cancel))
-            return canceled(e);
+            return engine_canceled(e);
     }
     if (rc >= 0)
-        enter(e, before, "the store takes readings again");
+        engine_enter(e, before, "the store takes readings again");
     return rc;
 }
 
@@ -454,7 +304,7 @@ static int do_point(struct engine *e)
 {
     struct travel_pose at;
     if (cancel_requested(e->ports->cancel))
-        return canceled(e);
+        return engine_canceled(e);
     if (engine_pause_asked(e))
         return engine_operator_paused(e);
     int rc = prepare(e);
@@ -467,7 +317,7 @@ static int do_point(struct engine *e)
     if (rc < 0)
         return rc;
     if (e->point->kind == PLAN_SAMPLE)
-        enter(e, RUN_RUNNING, NULL);
+        engine_enter(e, RUN_RUNNING, NULL);
     if (e->point->kind == PLAN_BEAM) // the brightest there is
         e->acquire.range = -1;
     if (at.still_ns > e->light_ns)
@@ -509,7 +359,7 @@ static int see_through(struct engine *e)
         }
         if (rc == GON_E_CANCELED || rc == GON_E_INPUT || rc == GON_E_SYSTEM)
             return rc;
-        rc = pause_run(e);
+        rc = engine_pause_run(e);
         if (rc < 0)
             return rc;
     }
@@ -534,20 +384,20 @@ static enum run_state finish(struct engine *e, int rc, struct gon_error *err)
 {
     char text[700];
     if (rc < 0)
-        enter(e, RUN_STOPPING, NULL);
-    make_safe(e);
+        engine_enter(e, RUN_STOPPING, NULL);
+    engine_make_safe(e);
     if (rc == GON_E_CANCELED) {
-        snprintf(text, sizeof text, "%s; go on with: gonio resume", light_text(e));
-        enter(e, RUN_STOPPED, text);
+        snprintf(text, sizeof text, "%s; go on with: gonio resume", engine_light_text(e));
+        engine_enter(e, RUN_STOPPED, text);
     } else if (rc < 0) {
-        snprintf(text, sizeof text, "%s; %s", e->why.text, light_text(e));
-        enter(e, RUN_FAILED, text);
+        snprintf(text, sizeof text, "%s; %s", e->why.text, engine_light_text(e));
+        engine_enter(e, RUN_FAILED, text);
         if (err)
             *err = e->why;
     } else {
         e->ports->request_fit(e->ports->ctx, e->plan->sweeps, true);
-        snprintf(text, sizeof text, "every point is measured; %s", light_text(e));
-        enter(e, RUN_DONE, text);
+        snprintf(text, sizeof text, "every point is measured; %s", engine_light_text(e));
+        engine_enter(e, RUN_DONE, text);
     }
     return e->state;
 }
@@ -575,6 +425,6 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     }
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
-    enter(&e, RUN_PREPARING, NULL);
+    engine_enter(&e, RUN_PREPARING, NULL);
     return finish(&e, run_points(&e), err);
 }

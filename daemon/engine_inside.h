@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What engine.c (the run) and engine_light.c (the laser's part in it) share; nobody else includes
-// it.
+// What engine.c (the run), engine_pause.c (the safe state and how it is left) and engine_light.c
+// (the laser's part) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
@@ -33,13 +33,26 @@ struct engine {
 
 // Functions return 0, or a gon_code with its text in e->why.
 
+// --- engine.c ---
 // An event row, and the same for whoever watches.
 void engine_say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt,
                 ...) __attribute__((format(printf, 4, 5)));
+// A state, for the file and for whoever watches; again the same without a text is no news.
+void engine_enter(struct engine *e, enum run_state state, const char *text);
+
+// --- engine_pause.c ---
+int engine_canceled(struct engine *e);        // GON_E_CANCELED
 int engine_nap(struct engine *e, int64_t ns); // GON_E_CANCELED
+const char *engine_light_text(const struct engine *e); // what may be said of the laser
+void engine_make_safe(struct engine *e);               // emission off, axes stopped
+// RUN_PAUSED; where the laser is not known to be off the text begins with that.
+void engine_enter_pause(struct engine *e, const char *text);
+// Safe, then what is to be done depends on what happened (e->why). 0: go on; GON_E_CANCELED.
+int engine_pause_run(struct engine *e);
 bool engine_pause_asked(struct engine *e);    // true once
 int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
 
+// --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.
 int engine_light_for(struct engine *e);
 // The laser was on and should be: one short question, and only when it is due; or all there is to

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+#include "daemon/engine_inside.h"
+
+#include "daemon/travel.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define RETURNS_MOST 5 // pauses that ended by themselves, without a reading between them
+
+int engine_canceled(struct engine *e)
+{
+    return gon_fail(&e->why, GON_E_CANCELED, "stopped");
+}
+
+int engine_nap(struct engine *e, int64_t ns)
+{
+    return instrument_wait(e->in, clk_now_ns(e->ports->clk) + ns, e->ports->cancel) < 0
+               ? engine_canceled(e)
+               : 0;
+}
+
+const char *engine_light_text(const struct engine *e)
+{
+    return safety_light_text(instrument_light_left(e->in));
+}
+
+void engine_make_safe(struct engine *e)
+{
+    struct gon_error err;
+    const bool was_on = instrument_light_left(e->in) == SAFETY_LIGHT_MAYBE;
+    e->ready = e->lit = e->dark = false;
+    instrument_permit(e->in, false);
+    if (instrument_emission_off(e->in, &err) < 0 && was_on)
+        engine_say(e, ENGINE_LOG, "err", "%s", err.text);
+    travel_stop(e->in, NULL);
+}
+
+static bool resume_asked(struct engine *e)
+{
+    return e->ports->take_resume(e->ports->ctx);
+}
+
+bool engine_pause_asked(struct engine *e)
+{
+    return e->ports->take_pause && e->ports->take_pause(e->ports->ctx);
+}
+
+int engine_operator_paused(struct engine *e)
+{
+    return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
+}
+
+static int next_lost(const struct instrument_snapshot *s, int part)
+{
+    while (part < PART_COUNT && s->part[part].link != PART_LOST)
+        part++;
+    return part;
+}
+
+// "axis theta_i, axis theta_r (rtu://...), laser (serial://...)", an address once for those that
+// share it. Returns how many are lost.
+static int name_lost(const struct engine *e, char *text, size_t size)
+{
+    struct instrument_snapshot s;
+    size_t length = 0;
+    int lost = 0;
+    instrument_snapshot(e->in, &s);
+    *text = 0;
+    for (int i = next_lost(&s, 0), next; i < PART_COUNT && length < size; i = next) {
+        const struct part_state *p = &s.part[i];
+        next = next_lost(&s, i + 1);
+        const bool shared = next < PART_COUNT && !strcmp(p->address, s.part[next].address);
+        const bool told = *p->address && !shared;
+        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s",
+                                   lost++ ? ", " : "", i < INSTRUMENT_AXES ? "axis " : "", p->name,
+                                   told ? " (" : "", told ? p->address : "", told ? ")" : "");
+    }
+    return lost;
+}
+
+static void describe_loss(const struct engine *e, char *text, size_t size)
+{
+    char names[360];
+    const int lost = name_lost(e, names, sizeof names);
+    if (e->why.code == GON_E_GONE && lost > 0)
+        snprintf(text, size, "%s: unplugged; waiting for %s to come back", names,
+                 lost == 1 ? "it" : "them");
+    else
+        snprintf(text, size, "%.400s; trying again", e->why.text);
+}
+
+// The warning comes first: whoever reads half of the line has read it.
+void engine_enter_pause(struct engine *e, const char *text)
+{
+    char whole[640];
+    const bool off = instrument_light_left(e->in) == SAFETY_LIGHT_OFF;
+    snprintf(whole, sizeof whole, "%s%s%s", off ? "" : engine_light_text(e), off ? "" : "; ", text);
+    engine_enter(e, RUN_PAUSED, whole);
+}
+
+static int wait_for_operator(struct engine *e)
+{
+    int64_t tend_ns = 0;
+    while (!resume_asked(e)) {
+        if (engine_nap(e, CLK_MS(100)) < 0)
+            return GON_E_CANCELED;
+        if (clk_now_ns(e->ports->clk) >= tend_ns) {
+            instrument_tend(e->in);
+            tend_ns = clk_now_ns(e->ports->clk) + CLK_S(1);
+        }
+    }
+    return 0;
+}
+
+// Until every device is back, or an operator took the pause over.
+static int wait_for_devices(struct engine *e)
+{
+    do {
+        if (engine_pause_asked(e)) {
+            engine_enter_pause(e, "paused by the operator; go on with: gonio resume");
+            return wait_for_operator(e);
+        }
+        (void)resume_asked(e); // it goes on by itself anyway
+        if (engine_nap(e, CLK_MS(100)) < 0)
+            return GON_E_CANCELED;
+    } while (instrument_reconnect(e->in) > 0);
+    return 0;
+}
+
+// Emission off, axes stopped, and what is to be done depends on what happened (e->why). 0: go on.
+int engine_pause_run(struct engine *e)
+{
+    const enum run_state before = e->state;
+    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
+    char text[600];
+    int rc;
+    engine_make_safe(e);
+    if (cancel_requested(e->ports->cancel))
+        return engine_canceled(e);
+    if (by_itself && e->returns < RETURNS_MOST) {
+        e->returns++;
+        describe_loss(e, text, sizeof text);
+        engine_enter_pause(e, text);
+        rc = wait_for_devices(e);
+    } else {
+        snprintf(text, sizeof text, "%.440s%s", e->why.text,
+                 by_itself ? "; it keeps failing: look at it, then: gonio resume" : "");
+        engine_enter_pause(e, text);
+        rc = wait_for_operator(e);
+        e->returns = 0;
+    }
+    if (rc >= 0)
+        engine_enter(e, before, by_itself ? "everything is there again; going on" : "resumed");
+    return rc;
+}
