@@ -10,8 +10,8 @@
 // plane (eq. 6). sigma is the rms slope per axis. BRDF in sr^-1. Outside its domain every function
 // returns NAN. Pure functions: any thread.
 #pragma once
-
-#define BRDF_INDEX_MAX 1e50 // of n and k: beyond it squares of squares overflow
+#include "model/fresnel.h"
+#include "model/geometry.h"
 
 struct brdf_params {
     double n;     // refractive index, > 0
@@ -25,22 +25,6 @@ enum brdf_diffuse {
     BRDF_DIFFUSE_PAPER,  // kd/cos theta_i: as printed; neither Lambertian nor reciprocal
     BRDF_DIFFUSE_LAMBERT // kd/pi
 };
-
-// One pair of directions, with all that does not depend on the parameters computed once.
-struct brdf_geometry {
-    double tan2_theta; // of the facet's normal against the surface's
-    double sin2_beta;  // local angle of incidence on the facet
-    double cos2_beta;
-    double spec_per_sr; // A = G / (4 pi cos^4 theta cos theta_i cos theta_r)
-    double inv_cos_i;   // 1/cos theta_i
-};
-
-// All members NAN outside the domain.
-struct brdf_geometry brdf_geometry(double theta_i_rad, double theta_r_rad, double dphi_rad);
-
-// (|rs|^2 + |rp|^2)/2 at local angle beta, in real arithmetic (no complex square root). Relative
-// error a few ulp also where it nearly vanishes (n near 1) and at total reflection (n < 1).
-double brdf_fresnel_mean(double n, double k, double sin2_beta, double cos2_beta);
 
 double brdf_f00(const struct brdf_params *p, enum brdf_diffuse diffuse,
                 const struct brdf_geometry *g);
