@@ -29,11 +29,11 @@ static bool in_domain(double n, double k)
 static struct parts parts_of(double n, double k, double sin2, double cos2)
 {
     const double im = 2 * n * k; // of N^2
-    const double d = (n - k) * (n + k) - sin2;
+    const double above = (n - 1) * (n + 1) - k * k;
+    const double d = cos2 < sin2 ? above + cos2 : (n - k) * (n + k) - sin2; // what rounds less
     const double m = sqrt(d * d + im * im);
     const double m_plus_d = d >= 0 ? m + d : im * im / (m - d); // total reflection inside, n < 1
     const double m_minus_d = d <= 0 ? m - d : im * im / (m + d);
-    const double above = (n - 1) * (n + 1) - k * k;
     const double y = sqrt(2 * cos2 * m_plus_d);
     const double x_plus_y = m + cos2 + y, z = m * cos2 + sin2 * sin2;
     return (struct parts){.w = above * above + im * im,
