@@ -8,7 +8,7 @@
 // frame and changes its hand, on both sides alike, so that the facet does not notice.
 static struct brdf_stokes facet_frame(double cos_alpha, double sin_alpha, struct brdf_stokes x)
 {
-    const double cos_2 = (cos_alpha - sin_alpha) * (cos_alpha + sin_alpha);
+    const double cos_2 = brdf_cos_twice(cos_alpha, sin_alpha);
     const double sin_2 = 2 * cos_alpha * sin_alpha;
     return (struct brdf_stokes){{x.s[0], cos_2 * x.s[1] + sin_2 * x.s[2],
                                  sin_2 * x.s[1] - cos_2 * x.s[2], -x.s[3]}};

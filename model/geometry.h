@@ -15,6 +15,12 @@ struct brdf_rotation {
     double cos_r, sin_r; // alpha_r
 };
 
+// cos(2 alpha): Stokes vectors turn by twice the angle.
+static inline double brdf_cos_twice(double cos_alpha, double sin_alpha)
+{
+    return (cos_alpha - sin_alpha) * (cos_alpha + sin_alpha);
+}
+
 struct brdf_geometry {
     double tan2_theta; // of the facet's normal against the surface's
     double sin2_beta;  // local angle of incidence on the facet

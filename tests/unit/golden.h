@@ -61,6 +61,20 @@ static inline bool golden_open(struct golden *t, const char *path)
     return true;
 }
 
+// A table of tests/golden that has to be there; ends the program otherwise.
+static inline struct golden golden_need(const char *name)
+{
+    struct golden t;
+    char path[128];
+    snprintf(path, sizeof path, "tests/golden/%s", name);
+    if (!golden_open(&t, path) || t.rows == 0) {
+        fprintf(stderr, "%s is missing or empty: run the tests from the root of the repository\n",
+                path);
+        abort();
+    }
+    return t;
+}
+
 static inline void golden_close(struct golden *t)
 {
     free(t->value);

@@ -11,16 +11,6 @@
 
 #define PI 3.14159265358979323846
 
-static struct golden open_or_fail(const char *name)
-{
-    struct golden t;
-    char path[128];
-    snprintf(path, sizeof path, "tests/golden/%s", name);
-    if (!golden_open(&t, path) || t.rows == 0)
-        fail_msg("%s is missing or empty: run the tests from the root of the repository", path);
-    return t;
-}
-
 static struct brdf_params params_at(const struct golden *t, int i)
 {
     return (struct brdf_params){golden_at(t, i, "n"), golden_at(t, i, "k"),
@@ -37,7 +27,7 @@ static double f00_at_deg(const struct brdf_params *p, double ti, double tr, doub
 // 1e-10 of f_00 without its diffuse part, which is what the reference program gives.
 static void check_rows(const char *name, bool in_plane)
 {
-    struct golden t = open_or_fail(name);
+    struct golden t = golden_need(name);
     for (int i = 0; i < t.rows; i++) {
         struct brdf_params p = params_at(&t, i);
         double ti = golden_at(&t, i, "theta_i_deg");
@@ -85,7 +75,7 @@ static void f00_shares_no_common_misreading_of_the_paper(void **state)
         {"f00_no_masking", "G left out (erratum 14)"},
         {"f00_dphi_flipped_180", "dphi = 0 taken for the specular half plane (erratum 13)"},
     };
-    struct golden t = open_or_fail("golden_traps.csv");
+    struct golden t = golden_need("golden_traps.csv");
     for (int i = 0; i < t.rows; i++) {
         struct brdf_params p = {golden_at(&t, i, "n"), golden_at(&t, i, "k"),
                                 golden_at(&t, i, "sigma"), 1, 0};
@@ -148,7 +138,7 @@ static void peak_moves_off_specular_and_sticks_at_the_kink_of_g(void **state)
 static void figure_5_has_the_reference_values_at_45_deg(void **state)
 {
     (void)state;
-    struct golden t = open_or_fail("fig5_facts.csv");
+    struct golden t = golden_need("fig5_facts.csv");
     for (int i = 0; i < t.rows; i++) {
         struct brdf_params p = {golden_at(&t, i, "n"), golden_at(&t, i, "k"),
                                 golden_at(&t, i, "sigma"), 1, 0};

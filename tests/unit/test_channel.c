@@ -15,16 +15,6 @@ static const double stokes[BRDF_STATES][4] = {{1, 0, 0, 0},  {1, 1, 0, 0}, {1, -
                                               {1, 0, 1, 0},  {1, 0, -1, 0}, {1, 0, 0, 1},
                                               {1, 0, 0, -1}};
 
-static struct golden open_or_fail(const char *name)
-{
-    struct golden t;
-    char path[128];
-    snprintf(path, sizeof path, "tests/golden/%s", name);
-    if (!golden_open(&t, path) || t.rows == 0)
-        fail_msg("%s is missing or empty: run the tests from the root of the repository", path);
-    return t;
-}
-
 static struct brdf_geometry geometry_at(const struct golden *t, int row)
 {
     return brdf_geometry(golden_rad(golden_at(t, row, "theta_i_deg")),
@@ -59,7 +49,7 @@ static double channel_at(const struct golden *t, int row, int in, int out)
 
 static void check_channels(const char *name)
 {
-    struct golden t = open_or_fail(name);
+    struct golden t = golden_need(name);
     double worst = 0;
     for (int i = 0; i < t.rows; i++)
         for (int in = 0; in < BRDF_STATES; in++)
