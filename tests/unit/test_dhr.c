@@ -65,6 +65,24 @@ static void perfect_mirror_reflects_all_when_smooth(void **state)
     }
 }
 
+// A smooth mirror reflects all from everywhere: shadowing begins at a slope of tan(30 deg -
+// theta_i/3), 7 sigma or more here, so that 1 is exact to 1e-9, the mirror's own loss.
+static void perfect_mirror_reflects_all_from_all_sides(void **state)
+{
+    (void)state;
+    double worst = 0;
+    for (double sigma = 0.01; sigma < 0.036; sigma += 0.005)
+        for (double deg = 0; deg <= 45; deg += 5) {
+            struct brdf_params p = mirror;
+            p.sigma = sigma;
+            const double dhr = brdf_dhr(&p, BRDF_DIFFUSE_PAPER, golden_rad(deg));
+            worst = fmax(worst, fabs(dhr - 1));
+            if (fabs(dhr - 1) > 1e-6)
+                fail_msg("sigma %g, theta_i %g deg: %.9f", sigma, deg, dhr);
+        }
+    print_message("mirror: off 1 by %.2g\n", worst);
+}
+
 static void dhr_of_a_smooth_surface_is_fresnel_s(void **state)
 {
     (void)state;
@@ -111,6 +129,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(dhr_equals_brute_force),
         cmocka_unit_test(perfect_mirror_reflects_all_when_smooth),
+        cmocka_unit_test(perfect_mirror_reflects_all_from_all_sides),
         cmocka_unit_test(dhr_of_a_smooth_surface_is_fresnel_s),
         cmocka_unit_test(dhr_near_grazing_incidence_is_converged),
         cmocka_unit_test(diffuse_albedo_of_both_forms),

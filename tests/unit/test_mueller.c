@@ -6,8 +6,8 @@
 #include "model/shadowing.h"
 #include "tests/unit/golden.h"
 #include "tests/unit/randoms.h"
+#include "tests/unit/transcription.h"
 
-#include <complex.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -119,23 +119,6 @@ static double complex pair(const struct golden *t, int i, const char *name)
     snprintf(re, sizeof re, "%s_re", name);
     snprintf(im, sizeof im, "%s_im", name);
     return golden_at(t, i, re) + golden_at(t, i, im) * (double complex)_Complex_I;
-}
-
-// m_jk of a Jones matrix, eq. 14.
-static void mueller_of_jones(double complex ss, double complex ps, double complex sp,
-                             double complex pp, double m[4][4])
-{
-    const double ss2 = pow(cabs(ss), 2), ps2 = pow(cabs(ps), 2);
-    const double sp2 = pow(cabs(sp), 2), pp2 = pow(cabs(pp), 2);
-    const double complex row0 = ss * conj(ps) + sp * conj(pp), row1 = ss * conj(ps) - sp * conj(pp);
-    const double complex col0 = ss * conj(sp) + ps * conj(pp), col1 = ss * conj(sp) - ps * conj(pp);
-    const double complex sum = ss * conj(pp) + ps * conj(sp), diff = ss * conj(pp) - ps * conj(sp);
-    const double all[4][4] = {
-        {(ss2 + pp2 + ps2 + sp2) / 2, (ss2 + sp2 - ps2 - pp2) / 2, creal(row0), cimag(row0)},
-        {(ss2 + ps2 - sp2 - pp2) / 2, (ss2 + pp2 - ps2 - sp2) / 2, creal(row1), cimag(row1)},
-        {creal(col0), creal(col1), creal(sum), cimag(diff)},
-        {-cimag(col0), -cimag(col1), -cimag(sum), creal(diff)}};
-    memcpy(m, all, sizeof all);
 }
 
 static void terms_equal_the_reference(void **state)
