@@ -19,16 +19,15 @@ enum { MOST_COLUMNS = 500 };
 
 struct csv {
     char *name, *text;
-    const char *next, *end;
-    long line; // of the row
+    const char *first, *next, *end; // first: behind the header
+    long line, header_line;         // line: of the row
     struct csv_field *fields;
     char **columns; // NULL-ended
     int count;
     locale_t c_locale;
 };
 
-// --- reading
-// -----------------------------------------------------------------------------------------
+// --- reading -------------------------------------------------------------------------------------
 
 static int slurp(int fd, const char *path, char **ret_text, size_t *ret_size, struct gon_error *err)
 {
@@ -62,20 +61,22 @@ int csv_open(const char *path, struct csv **ret_csv, struct gon_error *err)
 {
     char *text = NULL;
     size_t size = 0;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    const bool standard = !strcmp(path, "-");
+    const char *name = standard ? "standard input" : path;
+    int fd = standard ? STDIN_FILENO : open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0)
         return gon_fail(err, GON_E_INPUT, "%s: %s", path, strerror(errno));
-    int rc = slurp(fd, path, &text, &size, err);
-    close(fd);
+    int rc = slurp(fd, name, &text, &size, err);
+    if (!standard)
+        close(fd);
     if (rc < 0)
         return rc;
-    rc = csv_parse(text, size, path, ret_csv, err);
+    rc = csv_parse(text, size, name, ret_csv, err);
     free(text);
     return rc;
 }
 
-// --- rows
-// --------------------------------------------------------------------------------------------
+// --- rows ----------------------------------------------------------------------------------------
 
 static bool blank(char c)
 {
@@ -160,6 +161,8 @@ static int header(struct csv *c, struct gon_error *err)
     for (; c->count < n; c->count++)
         if (!(c->columns[c->count] = strndup(names[c->count].text, names[c->count].size)))
             return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", c->name);
+    c->first = c->next;
+    c->header_line = c->line;
     return GON_OK;
 }
 
@@ -216,13 +219,18 @@ int csv_next(struct csv *c, struct gon_error *err)
     return 1;
 }
 
+void csv_rewind(struct csv *c)
+{
+    c->next = c->first;
+    c->line = c->header_line;
+}
+
 long csv_line(const struct csv *c)
 {
     return c->line;
 }
 
-// --- columns
-// -----------------------------------------------------------------------------------------
+// --- columns -------------------------------------------------------------------------------------
 
 int csv_column(const struct csv *c, const char *name)
 {
@@ -237,20 +245,30 @@ int csv_no_column(const struct csv *c, const char *name, struct gon_error *err)
 {
     char all[300] = "";
     if (csv_column(c, name) == -2)
-        return gon_fail(err, GON_E_INPUT, "%s:1: column '%s' is there twice", c->name, name);
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: column '%s' is there twice", c->name,
+                        c->header_line, name);
     const char *meant = options_suggest(name, (const char *const *)c->columns);
     for (int i = 0; i < c->count; i++) {
         size_t used = strlen(all);
         snprintf(all + used, sizeof all - used, "%s%.40s", i ? ", " : "", c->columns[i]);
     }
-    return meant
-               ? gon_fail(err, GON_E_INPUT, "%s: no column '%s'; did you mean '%.60s'?", c->name,
-                          name, meant)
-               : gon_fail(err, GON_E_INPUT, "%s: no column '%s'; there are %s", c->name, name, all);
+    if (meant)
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; did you mean '%.60s'?", c->name,
+                        c->header_line, name, meant);
+    return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; there are %s", c->name,
+                    c->header_line, name, all);
 }
 
-// --- fields
-// ------------------------------------------------------------------------------------------
+int csv_need(const struct csv *c, const char *name, int *ret_column, struct gon_error *err)
+{
+    const int column = csv_column(c, name);
+    if (column < 0)
+        return csv_no_column(c, name, err);
+    *ret_column = column;
+    return GON_OK;
+}
+
+// --- fields --------------------------------------------------------------------------------------
 
 struct csv_field csv_text(const struct csv *c, int column)
 {

@@ -16,17 +16,20 @@ struct csv_field {
     size_t size;
 };
 
-int csv_open(const char *path, struct csv **ret_csv, struct gon_error *err);
+int csv_open(const char *path, struct csv **ret_csv, struct gon_error *err); // "-": standard input
 int csv_parse(const char *text, size_t size, const char *name, struct csv **ret_csv,
               struct gon_error *err);
 void csv_close(struct csv *c); // NULL is fine
 
 int csv_column(const struct csv *c, const char *name); // its index, -1: none; -2: there twice
+// The index, or csv_no_column's error.
+int csv_need(const struct csv *c, const char *name, int *ret_column, struct gon_error *err);
 // Adds to err: "no column 'NAME'" with the one that may have been meant, or all there are.
 // GON_E_INPUT.
 int csv_no_column(const struct csv *c, const char *name, struct gon_error *err);
 
 int csv_next(struct csv *c, struct gon_error *err); // 1: a row; 0: the end; GON_E_INPUT: ragged
+void csv_rewind(struct csv *c);                     // the next row is the first again
 int csv_real(const struct csv *c, int column, double *ret_value, struct gon_error *err);
 struct csv_field csv_text(const struct csv *c, int column);
 // An error in this row's field: "file:line: COLUMN = TEXT: ...".

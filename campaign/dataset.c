@@ -3,6 +3,7 @@
 
 #include "base/units.h"
 #include "campaign/csv.h"
+#include "campaign/direction.h"
 #include "campaign/reduce.h"
 
 #include <math.h>
@@ -51,8 +52,8 @@ struct fit_data dataset_fit_data(const struct dataset *d)
 // -------------------------------------------------------------------------------
 
 struct row {
-    double theta_i_deg, theta_r_deg, dphi_deg; // theta_r without sign
-    double f, u;                               // u NAN: none
+    struct direction direction;
+    double f, u; // u NAN: none
 };
 
 static bool grow(double **list, size_t room)
@@ -71,9 +72,9 @@ static int add(struct dataset *d, size_t *room, const struct row *r, struct gon_
             return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", d->source);
         *room = more;
     }
-    d->theta_i_rad[d->count] = units_rad(r->theta_i_deg);
-    d->theta_r_rad[d->count] = units_rad(r->theta_r_deg);
-    d->dphi_rad[d->count] = units_rad(r->dphi_deg);
+    d->theta_i_rad[d->count] = units_rad(r->direction.theta_i_deg);
+    d->theta_r_rad[d->count] = units_rad(r->direction.theta_r_deg);
+    d->dphi_rad[d->count] = units_rad(r->direction.dphi_deg);
     d->f_per_sr[d->count] = r->f;
     d->u_per_sr[d->count++] = r->u;
     return GON_OK;
@@ -106,29 +107,9 @@ static int finish(struct dataset *d, const char *column, struct gon_error *err)
 // ---------------------------------------------------------------------------------------------
 
 struct columns {
-    int theta_i, theta_r_signed, theta_r, dphi, value, u, pol_in, pol_out; // -1: not there
+    struct direction_columns direction;
+    int value, u, pol_in, pol_out; // -1: not there
 };
-
-static int needed(const struct csv *c, const char *name, int *ret_column, struct gon_error *err)
-{
-    int column = csv_column(c, name);
-    if (column < 0)
-        return csv_no_column(c, name, err);
-    *ret_column = column;
-    return GON_OK;
-}
-
-// theta_r_signed_deg unless the file has theta_r_deg and dphi_deg.
-static int find_directions(const struct csv *c, struct columns *k, struct gon_error *err)
-{
-    const bool unsigned_form =
-        csv_column(c, "theta_r_signed_deg") == -1 && csv_column(c, "theta_r_deg") != -1;
-    k->theta_r_signed = k->theta_r = k->dphi = -1;
-    if (!unsigned_form)
-        return needed(c, "theta_r_signed_deg", &k->theta_r_signed, err);
-    int rc = needed(c, "theta_r_deg", &k->theta_r, err);
-    return rc < 0 ? rc : needed(c, "dphi_deg", &k->dphi, err);
-}
 
 // u_NAME belongs to column NAME; u_f_r also to another column when there is no f_r.
 static int find_u(const struct csv *c, const char *column)
@@ -142,45 +123,13 @@ static int find_u(const struct csv *c, const char *column)
 static int find_columns(const struct csv *c, const char *column, struct columns *k,
                         struct gon_error *err)
 {
-    int rc = needed(c, "theta_i_deg", &k->theta_i, err);
+    int rc = direction_find(c, &k->direction, err);
     if (rc >= 0)
-        rc = find_directions(c, k, err);
-    if (rc >= 0)
-        rc = needed(c, column, &k->value, err);
+        rc = csv_need(c, column, &k->value, err);
     k->u = find_u(c, column);
     k->pol_in = csv_column(c, "pol_in");
     k->pol_out = csv_column(c, "pol_out");
     return rc;
-}
-
-static int take_angle(const struct csv *c, int column, double least_deg, double *ret_deg,
-                      struct gon_error *err)
-{
-    double deg;
-    int rc = csv_real(c, column, &deg, err);
-    if (rc < 0)
-        return rc;
-    if (!(deg >= least_deg && deg > -90 && deg < 90))
-        return csv_fail(c, column, err, "out of range; allowed %s deg",
-                        least_deg < 0 ? "-90..90 (both excluded)" : "0..90 (90 excluded)");
-    *ret_deg = deg;
-    return GON_OK;
-}
-
-static int take_direction(const struct csv *c, const struct columns *k, struct row *r,
-                          struct gon_error *err)
-{
-    if (k->theta_r_signed >= 0) {
-        double deg;
-        int rc = take_angle(c, k->theta_r_signed, -90, &deg, err);
-        if (rc >= 0) {
-            r->theta_r_deg = fabs(deg);
-            r->dphi_deg = deg >= 0 ? 180 : 0;
-        }
-        return rc;
-    }
-    int rc = take_angle(c, k->theta_r, 0, &r->theta_r_deg, err);
-    return rc < 0 ? rc : csv_real(c, k->dphi, &r->dphi_deg, err);
 }
 
 static int check_unpolarised(const struct csv *c, int column, struct gon_error *err)
@@ -197,9 +146,7 @@ static int check_unpolarised(const struct csv *c, int column, struct gon_error *
 static int take_row(const struct csv *c, const struct columns *k, struct row *r,
                     struct gon_error *err)
 {
-    int rc = take_angle(c, k->theta_i, 0, &r->theta_i_deg, err);
-    if (rc >= 0)
-        rc = take_direction(c, k, r, err);
+    int rc = direction_take(c, &k->direction, &r->direction, err);
     if (rc >= 0)
         rc = csv_real(c, k->value, &r->f, err);
     r->u = (double)NAN;
@@ -215,7 +162,7 @@ static int take_row(const struct csv *c, const struct columns *k, struct row *r,
 static int take_rows(struct csv *c, const char *column, const struct dataset_filter *filter,
                      struct dataset *d, struct gon_error *err)
 {
-    struct columns k = {-1, -1, -1, -1, -1, -1, -1, -1};
+    struct columns k;
     size_t room = 0;
     int rc = find_columns(c, column, &k, err);
     while (rc >= 0 && (rc = csv_next(c, err)) == 1) {
@@ -223,7 +170,7 @@ static int take_rows(struct csv *c, const char *column, const struct dataset_fil
         rc = take_row(c, &k, &r, err);
         if (rc < 0)
             return rc;
-        if (passes(filter, r.theta_i_deg))
+        if (passes(filter, r.direction.theta_i_deg))
             rc = add(d, &room, &r, err);
         else
             d->left_out++;
@@ -256,9 +203,7 @@ int dataset_from_csv(const char *path, const char *column, const struct dataset_
 static struct row row_of(const struct reduced_point *p)
 {
     const double theta_r_deg = p->theta_i_deg < 0 ? -p->theta_r_deg : p->theta_r_deg;
-    return (struct row){.theta_i_deg = fabs(p->theta_i_deg),
-                        .theta_r_deg = fabs(theta_r_deg),
-                        .dphi_deg = theta_r_deg >= 0 ? 180 : 0,
+    return (struct row){.direction = direction_in_plane(fabs(p->theta_i_deg), theta_r_deg),
                         .f = p->f_per_sr,
                         .u = p->u_a_per_sr};
 }

@@ -111,8 +111,10 @@ static int load_campaign(const struct options *o, const char *file, struct datas
     return rc;
 }
 
-static bool is_file(const char *path)
+static bool is_file(const char *path) // "-" is standard input
 {
+    if (!strcmp(path, "-"))
+        return true;
     return access(path, F_OK) == 0 || errno != ENOENT; // opening a FIFO would wait for its writer
 }
 

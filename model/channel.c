@@ -10,8 +10,8 @@ static struct brdf_stokes facet_frame(double cos_alpha, double sin_alpha, struct
 {
     const double cos_2 = brdf_cos_twice(cos_alpha, sin_alpha);
     const double sin_2 = 2 * cos_alpha * sin_alpha;
-    return (struct brdf_stokes){{x.s[0], cos_2 * x.s[1] + sin_2 * x.s[2],
-                                 sin_2 * x.s[1] - cos_2 * x.s[2], -x.s[3]}};
+    return (struct brdf_stokes){
+        {x.s[0], cos_2 * x.s[1] + sin_2 * x.s[2], sin_2 * x.s[1] - cos_2 * x.s[2], -x.s[3]}};
 }
 
 struct brdf_channel brdf_channel(const struct brdf_geometry *geometry, enum brdf_state in,

@@ -23,7 +23,7 @@ struct brdf_channel {
     double w_kd;                   // 1 without an analyser, 1/2 behind one: kd depolarises
 };
 
-// The first four are NAN when the geometry is. w_re^2 + w_im^2 <= 4 w_ss w_pp, with equality for two pure
-// states.
+// The first four are NAN when the geometry is. w_re^2 + w_im^2 <= 4 w_ss w_pp, with equality for
+// two pure states.
 struct brdf_channel brdf_channel(const struct brdf_geometry *g, enum brdf_state in,
                                  enum brdf_state out);

@@ -52,7 +52,7 @@ struct brdf_fresnel brdf_fresnel(double n, double k, double sin2_beta, double co
     const struct parts p = parts_of(n, k, sin2, cos2);
     if (p.norm == 0) // N^2 = 0 in doubles, or grazing exactly on the critical angle: all reflected
         return (struct brdf_fresnel){1, 1, sin2 < cos2 ? -1 : 1, 0};
-    const double unit = p.w / p.norm; // |rs|^2 / |sin^2 + q cos|^2
+    const double unit = p.w / p.norm;                               // |rs|^2 / |sin^2 + q cos|^2
     const double re = sin2 - p.two_re_qc / 2, im = p.two_im_qc / 2; // of sin^2 - (q cos)*
     return (struct brdf_fresnel){.ss = unit * (p.z + p.two_re_qc * sin2),
                                  .pp = unit * (re * re + im * im),

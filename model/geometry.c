@@ -73,8 +73,8 @@ struct brdf_geometry brdf_geometry(double theta_i_rad, double theta_r_rad, doubl
         .tan2_theta = tan_half * tan_half + sin_i * sin_r * bend * bend,
         .sin2_beta = sin2_b,
         .cos2_beta = cos2_b,
-        .spec_per_sr = shadowing(cos_i, cos_r, mean_z / cos2_b) * sec2_t * sec2_t /
-                       (4 * PI * (cos_i * cos_r)),
+        .spec_per_sr =
+            shadowing(cos_i, cos_r, mean_z / cos2_b) * sec2_t * sec2_t / (4 * PI * (cos_i * cos_r)),
         .inv_cos_i = 1 / cos_i,
         .rotation = rotation(sum, difference, sqrt(cos2_b), sqrt(sin2_b)),
     };

@@ -11,8 +11,8 @@
 
 #define PI 3.14159265358979323846
 
-static const double stokes[BRDF_STATES][4] = {{1, 0, 0, 0},  {1, 1, 0, 0}, {1, -1, 0, 0},
-                                              {1, 0, 1, 0},  {1, 0, -1, 0}, {1, 0, 0, 1},
+static const double stokes[BRDF_STATES][4] = {{1, 0, 0, 0}, {1, 1, 0, 0},  {1, -1, 0, 0},
+                                              {1, 0, 1, 0}, {1, 0, -1, 0}, {1, 0, 0, 1},
                                               {1, 0, 0, -1}};
 
 static struct brdf_geometry geometry_at(const struct golden *t, int row)
@@ -39,8 +39,8 @@ static double channel_at(const struct golden *t, int row, int in, int out)
 {
     const struct brdf_geometry g = geometry_at(t, row);
     const struct brdf_channel w = brdf_channel(&g, (enum brdf_state)in, (enum brdf_state)out);
-    const struct brdf_fresnel r = brdf_fresnel(golden_at(t, row, "n"), golden_at(t, row, "k"),
-                                               g.sin2_beta, g.cos2_beta);
+    const struct brdf_fresnel r =
+        brdf_fresnel(golden_at(t, row, "n"), golden_at(t, row, "k"), g.sin2_beta, g.cos2_beta);
     const double sigma = golden_at(t, row, "sigma"), v = 1 / (2 * sigma * sigma);
     return golden_at(t, row, "ks") * v * g.spec_per_sr * exp(-v * g.tan2_theta) *
                (w.w_ss * r.ss + w.w_pp * r.pp + w.w_re * r.re + w.w_im * r.im) +

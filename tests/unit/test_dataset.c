@@ -177,13 +177,13 @@ static void bad_files_are_refused(void **state)
 {
     (void)state;
     refused("theta_i_deg,theta_r_signed_deg,f_450nm,f_550nm\n1,2,3,4\n", "f_45nm",
-            ": no column 'f_45nm'; did you mean 'f_450nm'?");
+            ":1: no column 'f_45nm'; did you mean 'f_450nm'?");
     refused("theta_i_deg,theta_r_signed_deg,value\n1,2,3\n", NULL,
-            ": no column 'f_r'; there are theta_i_deg, theta_r_signed_deg, value");
+            ":1: no column 'f_r'; there are theta_i_deg, theta_r_signed_deg, value");
     refused("theta_i,theta_r_signed_deg,f_r\n1,2,3\n", NULL,
-            ": no column 'theta_i_deg'; did you mean 'theta_i'?");
+            ":1: no column 'theta_i_deg'; did you mean 'theta_i'?");
     refused("theta_i_deg,theta_r_deg,f_r\n1,2,3\n", NULL,
-            ": no column 'dphi_deg'; there are theta_i_deg, theta_r_deg, f_r");
+            ":1: no column 'dphi_deg'; there are theta_i_deg, theta_r_deg, f_r");
     refused("theta_i_deg,theta_r_signed_deg,f_r,f_r\n1,2,3,4\n", NULL,
             ":1: column 'f_r' is there twice");
     refused(HEAD "1,2,0\n1,3,-0.0\n", NULL, ": f_r is zero in all 2 rows");

@@ -198,10 +198,10 @@ static void alpha_is_an_angle(void **state)
         const double dphi = random_between(&random, -RANDOM_PI, RANDOM_PI);
         const struct brdf_geometry g = brdf_geometry(ti, tr, dphi);
         const struct brdf_rotation *r = &g.rotation;
-        const struct alphas printed = transcribe_alphas(ti, tr, dphi, sqrt(g.cos2_beta),
-                                                        sqrt(g.sin2_beta), MISREAD_ALPHA_R);
-        const struct alphas mended = transcribe_alphas(ti, tr, dphi, sqrt(g.cos2_beta),
-                                                       sqrt(g.sin2_beta), MISREAD_NOTHING);
+        const struct alphas printed =
+            transcribe_alphas(ti, tr, dphi, sqrt(g.cos2_beta), sqrt(g.sin2_beta), MISREAD_ALPHA_R);
+        const struct alphas mended =
+            transcribe_alphas(ti, tr, dphi, sqrt(g.cos2_beta), sqrt(g.sin2_beta), MISREAD_NOTHING);
         impossible += fabs(printed.cos_r) > 1;
         worst = fmax(worst, fabs(r->cos_i * r->cos_i + r->sin_i * r->sin_i - 1));
         worst = fmax(worst, fabs(r->cos_r * r->cos_r + r->sin_r * r->sin_r - 1));

@@ -107,8 +107,8 @@ static void a_rougher_surface_has_a_lower_and_wider_peak(void **state)
         last = height;
         if (sigma > 0.15)
             continue; // the width runs into the horizon
-        const double w = half_height_deg(&p, at, height / 2, 0.01) -
-                         half_height_deg(&p, at, height / 2, -0.01);
+        const double w =
+            half_height_deg(&p, at, height / 2, 0.01) - half_height_deg(&p, at, height / 2, -0.01);
         assert_true(w > width);
         width = w;
     }
@@ -132,8 +132,8 @@ static void the_peak_grows_with_k_always_and_with_n_not_always(void **state)
     (void)state;
     // Six digits each.
     static const double at_n[][2] = {{1.3, .266664}, {1.5, .456611}, {2, 1.00814}, {3, 2.04256}};
-    static const double at_k[][2] = {{0, .976024}, {.2, 1.00814}, {1, 1.68187},
-                                     {3, 4.38826}, {7.5, 6.93788}};
+    static const double at_k[][2] = {
+        {0, .976024}, {.2, 1.00814}, {1, 1.68187}, {3, 4.38826}, {7.5, 6.93788}};
     for (int i = 0; i < 4; i++) {
         const struct brdf_params p = {at_n[i][0], 0.2, 0.1, 1, 0};
         assert_near(f00_at(&p, 45) / at_n[i][1], 1, 5e-6);

@@ -131,7 +131,8 @@ static void terms_equal_the_reference(void **state)
                                       golden_at(&t, i, "sigma"), 1, 0};
         const double ti = golden_rad(golden_at(&t, i, "theta_i_deg"));
         const double tr = golden_rad(golden_at(&t, i, "theta_r_deg"));
-        const struct brdf_geometry g = brdf_geometry(ti, tr, golden_rad(golden_at(&t, i, "dphi_deg")));
+        const struct brdf_geometry g =
+            brdf_geometry(ti, tr, golden_rad(golden_at(&t, i, "dphi_deg")));
         const struct brdf_fresnel r = brdf_fresnel(p.n, p.k, g.sin2_beta, g.cos2_beta);
         const double beta = golden_rad(golden_at(&t, i, "beta_deg"));
         const double theta = golden_rad(golden_at(&t, i, "theta_deg"));
@@ -358,8 +359,8 @@ static void matrix_equals_the_vector_form_everywhere(void **state)
         // beta of 1e-15 rad to 6 deg
         const double ti = random_between(&random, 0, 1.47), off = random_log(&random, 1e-15, 0.1);
         const double turn = random_between(&random, -3.1, 3.1);
-        check_vector_form(&p, (struct random_angles){ti, fabs(ti + off * cos(turn)), off * sin(turn)},
-                          &near);
+        check_vector_form(
+            &p, (struct random_angles){ti, fabs(ti + off * cos(turn)), off * sin(turn)}, &near);
     }
     print_message("vector form: worst of %d: %.2g f_00; near backscatter %.2g f_00\n", EVERY, worst,
                   near);
@@ -375,7 +376,12 @@ static void exact_backscatter_is_a_mirror_at_normal_incidence(void **state)
         assert_near(g.sin2_beta, 0, 0);
         for (int j = 0; j < 4; j++)
             for (int k = 0; k < 4; k++)
-                assert_near(f.m[j][k], (j != k ? 0 : j < 2 ? 1 : -1) * f.m[0][0], 2e-16 * f.m[0][0]);
+                assert_near(f.m[j][k],
+                            (j != k  ? 0
+                             : j < 2 ? 1
+                                     : -1) *
+                                f.m[0][0],
+                            2e-16 * f.m[0][0]);
     }
 }
 
@@ -439,8 +445,9 @@ static void matrix_outside_the_domain_is_nan(void **state)
                                       {1.5, 0, .1, -1, 0}, {1.5, 0, .1, 1, -1}, {nan, 0, .1, 1, 0},
                                       {1.5, 0, .1, 1, nan}};
     for (size_t i = 0; i < 4 + sizeof bad / sizeof *bad; i++) {
-        const struct brdf_geometry g = i < 4 ? geometry_deg(angles[i][0], angles[i][1], angles[i][2])
-                                             : geometry_deg(30, 20, 90);
+        const struct brdf_geometry g = i < 4
+                                           ? geometry_deg(angles[i][0], angles[i][1], angles[i][2])
+                                           : geometry_deg(30, 20, 90);
         const struct brdf_mueller f =
             brdf_mueller(i < 4 ? &good : &bad[i - 4], BRDF_DIFFUSE_PAPER, &g);
         for (int j = 0; j < 16; j++)

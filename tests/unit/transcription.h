@@ -62,10 +62,9 @@ static inline struct alphas transcribe_alphas(double ti, double tr, double dphi,
                                               double sin_beta, enum misreading wrong)
 {
     const double s2 = 2 * sin_beta * cos_beta;
-    struct alphas a = {(sin(ti) * cos(tr) - cos(ti) * sin(tr) * cos(dphi)) / s2,
-                       sin(tr) * sin(dphi) / s2,
-                       (sin(tr) * cos(ti) - cos(tr) * sin(ti) * cos(dphi)) / s2,
-                       sin(ti) * sin(dphi) / s2};
+    struct alphas a = {
+        (sin(ti) * cos(tr) - cos(ti) * sin(tr) * cos(dphi)) / s2, sin(tr) * sin(dphi) / s2,
+        (sin(tr) * cos(ti) - cos(tr) * sin(ti) * cos(dphi)) / s2, sin(ti) * sin(dphi) / s2};
     const double cos_theta = (cos(ti) + cos(tr)) / (2 * cos_beta);
     if (wrong == MISREAD_ALPHA_R) {
         a.cos_r = (cos_theta - cos(ti) * cos_beta) / (sin(tr) * sin_beta);
@@ -103,9 +102,8 @@ static inline void transcribe(const struct brdf_params *p, double ti, double tr,
     const double hz = cos(ti) + cos(tr), h = sqrt(hx * hx + hy * hy + hz * hz);
     const double cos_beta = h / 2, sin_beta = sqrt(fmax(0, 1 - cos_beta * cos_beta));
     const double cos_t = hz / h, tan2_t = (hx * hx + hy * hy) / (hz * hz);
-    const double g = wrong == MISREAD_NO_SHADOWING
-                         ? 1
-                         : fmin(1, 2 * cos_t * fmin(cos(ti), cos(tr)) / cos_beta);
+    const double g =
+        wrong == MISREAD_NO_SHADOWING ? 1 : fmin(1, 2 * cos_t * fmin(cos(ti), cos(tr)) / cos_beta);
     const double width = (wrong == MISREAD_EXPONENT ? 1 : 2) * p->sigma * p->sigma;
     const double c = p->ks / (2 * acos(-1)) / (4 * p->sigma * p->sigma) * g / pow(cos_t, 4) *
                      exp(-tan2_t / width) / (cos(ti) * cos(tr));
