@@ -2,6 +2,7 @@
 // uses: model
 #include "model/brdf.h"
 #include "tests/unit/golden.h"
+#include "tests/unit/randoms.h"
 
 #include <complex.h>
 #include <setjmp.h>
@@ -102,6 +103,34 @@ static void fresnel_keeps_its_digits_where_it_nearly_vanishes(void **state)
     assert_near(brdf_fresnel_mean(0.4, 0, 0.5, 0.5), 1, 1e-15); // total reflection
 }
 
+// Random indices, near 1 and extreme, to the last degree before grazing, in extended precision.
+static void fresnel_keeps_its_digits_everywhere(void **state)
+{
+    (void)state;
+    uint64_t random = random_seed();
+    double worst = 0;
+    for (int i = 0; i < 200000; i++) {
+        const struct brdf_params p = random_params(&random);
+        const double n = i % 2 ? p.n : 1 + random_log(&random, 1e-12, 1e-3);
+        const double k = i % 2 ? p.k : i % 4 ? 0 : random_log(&random, 1e-12, 1e-3);
+        const double c2 = random_log(&random, 1e-12, 1), s2 = 1 - c2;
+        if (n < 1)
+            continue; // near the critical angle the last bit of beta moves R by its square root
+        const long double complex index =
+            (long double)n + (long double)k * (long double complex)_Complex_I;
+        const long double complex above = (index - 1) * (index + 1), q = csqrtl(above + (long double)c2);
+        const long double c = sqrtl((long double)c2), sin2 = 1 - (long double)c2;
+        const long double rs = cabsl(above / ((c + q) * (c + q)));
+        const long double rp = rs * cabsl((sin2 - q * c) / (sin2 + q * c));
+        const double want = (double)((rs * rs + rp * rp) / 2);
+        const double error = fabs(brdf_fresnel_mean(n, k, s2, c2) / want - 1);
+        worst = fmax(worst, want > 0 ? error : 0);
+        if (want > 0 && !(error <= 1e-12))
+            fail_msg("n %.17g, k %.17g, cos^2 beta %.17g: off by %.3g", n, k, c2, error);
+    }
+    print_message("worst relative error %.2g\n", worst);
+}
+
 static void outside_the_domain_everything_is_nan(void **state)
 {
     (void)state;
@@ -141,6 +170,7 @@ int main(void)
         cmocka_unit_test(diffuse_part_is_kd_over_cos_or_kd_over_pi),
         cmocka_unit_test(real_fresnel_equals_the_complex_form),
         cmocka_unit_test(fresnel_keeps_its_digits_where_it_nearly_vanishes),
+        cmocka_unit_test(fresnel_keeps_its_digits_everywhere),
         cmocka_unit_test(outside_the_domain_everything_is_nan),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
