@@ -49,5 +49,5 @@ double brdf_between(const struct brdf_params *p, enum brdf_diffuse diffuse,
                     const struct brdf_geometry *g, enum brdf_state in, enum brdf_state out);
 
 // Directional-hemispherical reflectance: f_00 cos theta_r over the hemisphere; absolute error <
-// 1e-6 for sigma in [0.01, 0.6] and theta_i up to 89.9 deg. Some 0.1 ms (model/dhr.c).
+// 1e-6 for sigma in [0.01, 0.6] and theta_i up to 89.9 deg. Some 0.2 ms (model/dhr.c).
 double brdf_dhr(const struct brdf_params *p, enum brdf_diffuse diffuse, double theta_i_rad);

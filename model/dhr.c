@@ -8,7 +8,7 @@
 // theta dx dy, and cos theta_r = 2 cos beta cos theta - cos theta_i. The three terms of the minimum
 // are G = 1, G limited by theta_r, and G limited by theta_i. The minimum has kinks, whose places in
 // y are known for each x: the inner integral is split there, and the outer one where a kink enters
-// or leaves.
+// or leaves. So is F at total reflection (n < 1), which k rounds off over 2 n k in sin^2 beta.
 #include "model/brdf.h"
 
 #include <math.h>
@@ -17,11 +17,15 @@
 #define REACH 7.0 // in sigma: the Gaussian beyond weighs 1e-11
 #define NODES 12
 #define DEPTH 12 // of the outer bisection
+#define CRITICAL 3
+#define WIDTH 6.0
+#define MOST_CUTS 20
 
 struct dhr {
     double n, k, v;
     double cos_i, tan_i;
-    double reach; // of the Gaussian that matters, in slope
+    double reach;               // of the Gaussian that matters, in slope
+    double critical[CRITICAL];  // sin^2 beta where total reflection begins; NAN: nowhere
 };
 
 // Gauss-Legendre on [0, 1], 12 nodes, the lower half (Abramowitz and Stegun table 25.4, mapped).
@@ -65,7 +69,17 @@ static double inner_piece(const struct dhr *d, double x, double q, double from, 
     return sum * (to - from);
 }
 
-// Over y in [0, ymax], split at the kink of G, at the critical angle, and into halves when it is
+static void sort(double *x, int count)
+{
+    for (int i = 1; i < count; i++)
+        for (int j = i; j > 0 && x[j] < x[j - 1]; j--) {
+            double swap = x[j];
+            x[j] = x[j - 1];
+            x[j - 1] = swap;
+        }
+}
+
+// Over y in [0, ymax], split at the kink of G and at the critical angle, and into halves when it is
 // long.
 static double inner(const struct dhr *d, double x)
 {
@@ -73,19 +87,20 @@ static double inner(const struct dhr *d, double x)
     double end2 = 2 * q - 1 - x * x; // cos theta_r = 0
     if (!(q > 0 && end2 > 0))
         return 0;
-    double end = fmin(sqrt(end2), d->reach);
-    double cos_b = q * d->cos_i;
+    double end = fmin(sqrt(end2), d->reach), cut[3 + CRITICAL];
     double kink2 = (q < 2 ? 4 * q / (q + 2) : q) - 1 - x * x;
-    double critical2 = d->n < 1 ? cos_b * cos_b / (1 - d->n * d->n) - 1 - x * x : -1;
-    double cut[4] = {0, sqrt(fmax(kink2, 0)), sqrt(fmax(critical2, 0)), end};
-    if (cut[1] > cut[2]) {
-        double swap = cut[1];
-        cut[1] = cut[2];
-        cut[2] = swap;
+    int count = 0;
+    cut[count++] = 0;
+    cut[count++] = sqrt(fmax(kink2, 0));
+    for (int i = 0; i < CRITICAL; i++) {
+        double cos_b = q * d->cos_i, y2 = cos_b * cos_b / (1 - d->critical[i]) - 1 - x * x;
+        cut[count++] = sqrt(fmax(y2, 0)); // 0 of NAN
     }
+    cut[count++] = end;
+    sort(cut, count);
     double sum = 0, longest = d->reach / 2;
-    for (int i = 0; i < 3; i++) {
-        double from = fmin(cut[i], end), to = fmin(cut[i + 1], end);
+    for (int i = 0; i + 1 < count && cut[i] < end; i++) {
+        double from = cut[i], to = cut[i + 1];
         if (!(to > from))
             continue;
         int pieces = to - from > longest ? 2 : 1;
@@ -119,10 +134,10 @@ static double outer(const struct dhr *d, double from, double to, double whole, i
 
 // The places in x where a kink or the edge of the hemisphere crosses y = 0, in rising order within
 // +-reach.
-static int outer_cuts(const struct dhr *d, double theta_i_rad, double *ret_cut)
+static int outer_cuts(const struct dhr *d, double theta_i_rad, double ret_cut[MOST_CUTS])
 {
     double t = theta_i_rad;
-    double special[8] = {
+    double special[8 + 2 * CRITICAL] = {
         0, // also G = 1 meets G limited by theta_i
         tan(t),
         tan((t - PI / 2) / 2),
@@ -132,19 +147,28 @@ static int outer_cuts(const struct dhr *d, double theta_i_rad, double *ret_cut)
         tan((t + PI / 2) / 3),
         -1 / d->tan_i, // G limited by theta_r begins
     };
-    int count = 0;
+    int specials = 8, count = 0;
+    for (int i = 0; i < CRITICAL; i++) {
+        double critical_rad = asin(sqrt(d->critical[i]));
+        special[specials++] = tan(t - critical_rad);
+        special[specials++] = tan(t + critical_rad);
+    }
     ret_cut[count++] = -d->reach;
-    for (int i = 0; i < 8; i++)
+    for (int i = 0; i < specials; i++)
         if (special[i] > -d->reach && special[i] < d->reach)
             ret_cut[count++] = special[i];
     ret_cut[count++] = d->reach;
-    for (int i = 1; i < count; i++)
-        for (int j = i; j > 0 && ret_cut[j] < ret_cut[j - 1]; j--) {
-            double swap = ret_cut[j];
-            ret_cut[j] = ret_cut[j - 1];
-            ret_cut[j - 1] = swap;
-        }
+    sort(ret_cut, count);
     return count;
+}
+
+// Where total reflection sets in, and WIDTH times the width of its rounding to both sides.
+static void find_critical(struct dhr *d)
+{
+    for (int i = 0; i < CRITICAL; i++) {
+        double sin2 = d->n * d->n - d->k * d->k + (i - 1) * WIDTH * 2 * d->n * d->k;
+        d->critical[i] = d->n < 1 && sin2 > 0 && sin2 < 1 ? sin2 : (double)NAN;
+    }
 }
 
 double brdf_dhr(const struct brdf_params *p, enum brdf_diffuse diffuse, double theta_i_rad)
@@ -155,7 +179,8 @@ double brdf_dhr(const struct brdf_params *p, enum brdf_diffuse diffuse, double t
     struct dhr d = {.n = p->n, .k = p->k, .v = 1 / (2 * p->sigma * p->sigma),
                     .cos_i = cos(theta_i_rad), .tan_i = tan(theta_i_rad),
                     .reach = REACH * p->sigma};
-    double cut[10];
+    double cut[MOST_CUTS];
+    find_critical(&d);
     int count = outer_cuts(&d, theta_i_rad, cut);
     double specular = 0;
     for (int i = 0; i + 1 < count; i++)
