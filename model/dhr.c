@@ -16,16 +16,16 @@
 #define PI 3.14159265358979323846
 #define REACH 7.0 // in sigma: the Gaussian beyond weighs 1e-11
 #define NODES 12
-#define DEPTH 12 // of the outer bisection
-#define CRITICAL 3
+#define DEPTH 12   // of the outer bisection
+#define CRITICAL 3 // places of total reflection: find_critical
 #define WIDTH 6.0
 #define MOST_CUTS 20
 
 struct dhr {
     double n, k, v;
     double cos_i, tan_i;
-    double reach;               // of the Gaussian that matters, in slope
-    double critical[CRITICAL];  // sin^2 beta where total reflection begins; NAN: nowhere
+    double reach;              // of the Gaussian that matters, in slope
+    double critical[CRITICAL]; // sin^2 beta where total reflection begins; NAN: nowhere
 };
 
 // Gauss-Legendre on [0, 1], 12 nodes, the lower half (Abramowitz and Stegun table 25.4, mapped).
@@ -176,8 +176,11 @@ double brdf_dhr(const struct brdf_params *p, enum brdf_diffuse diffuse, double t
     struct brdf_geometry normal = brdf_geometry(theta_i_rad, 0, PI);
     if (isnan(brdf_f00(p, diffuse, &normal)))
         return (double)NAN;
-    struct dhr d = {.n = p->n, .k = p->k, .v = 1 / (2 * p->sigma * p->sigma),
-                    .cos_i = cos(theta_i_rad), .tan_i = tan(theta_i_rad),
+    struct dhr d = {.n = p->n,
+                    .k = p->k,
+                    .v = 1 / (2 * p->sigma * p->sigma),
+                    .cos_i = cos(theta_i_rad),
+                    .tan_i = tan(theta_i_rad),
                     .reach = REACH * p->sigma};
     double cut[MOST_CUTS];
     find_critical(&d);

@@ -30,7 +30,7 @@ struct brdf_geometry {
     struct brdf_rotation rotation;
 };
 
-// Every member keeps full relative accuracy at specular, at backscatter and at grazing. Exchanging
-// the directions (theta_i with theta_r, dphi with -dphi) or the sign of dphi changes nothing but
-// signs, to the last bit: reciprocity and mirror symmetry of the model are exact.
+// Full relative accuracy at specular, at backscatter and at grazing; the rotation: some ulp of 1.
+// Exchanging the directions (theta_i with theta_r, dphi with -dphi) or the sign of dphi changes
+// nothing but signs, to the last bit: reciprocity and mirror symmetry of the model are exact.
 struct brdf_geometry brdf_geometry(double theta_i_rad, double theta_r_rad, double dphi_rad);
