@@ -83,6 +83,12 @@ $(B)/obj/%.o: %.c Makefile
 # Nobody reads the floating-point exception flags, and without them a conditional becomes a maximum.
 $(B)/obj/model/%.o $(B)/obj/fit/%.o: CFLAGS += $(if $(filter asan debug,$(VARIANT)),,-O3 -fno-trapping-math)
 
+# The batch kernels are compiled once for each instruction set and chosen at run time (model/batch.h); on machines
+# other than x86 these files are empty.
+X86 := $(filter x86_64-%,$(shell $(CC) -dumpmachine))
+$(B)/obj/%_avx2.o: CFLAGS += $(if $(X86),-mavx2 -mfma)
+$(B)/obj/%_avx512.o: CFLAGS += $(if $(X86),-mavx512f -mavx512dq -mavx2 -mfma)
+
 # --- tests ----------------------------------------------------------------------------------------
 # tests/unit/test_<module>.c is one program. The layers it needs are named in its first lines: '// uses: fit model'.
 UNIT_TESTS := $(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c))

@@ -121,7 +121,7 @@ int fit_run(const struct fit_data *data, const struct fit_options *options,
     stop = uncertainty_estimate(data, &set, options, &control, &optimum, &r);
     if (stop)
         goto out;
-    r.evaluations = lrint(control.points / (double)set.padded);
+    r.evaluations = lrint(control.points / (double)set.distinct.padded);
     r.elapsed_total_ms = elapsed_ms(&start);
     *ret_result = r;
 out:

@@ -185,7 +185,7 @@ static int polish_niches(struct search *s, struct fit_optimum *niche)
 // 64 individuals and 16 niches at 850 points; between 48 and 192, and 8 and 24.
 static void size_search(struct search *s)
 {
-    double scale = sqrt(850.0 / (double)s->set->count);
+    double scale = sqrt(850.0 / (double)s->set->distinct.count);
     s->population = (int)fmin(POPULATION_MAX, fmax(48, 64 * scale)) / 2 * 2;
     s->niches = (int)fmin(NICHES_MAX, fmax(8, 16 * scale));
 }
@@ -213,7 +213,7 @@ int memetic_search(const struct fit_set *set, const struct fit_space *space,
     struct fit_set sample = {.count = 0};
     struct search *s = calloc(1, sizeof *s);
     int stop = s ? 0 : FIT_E_MEMORY;
-    if (!stop && set->count > MEMETIC_SAMPLE)
+    if (!stop && set->distinct.count > MEMETIC_SAMPLE)
         stop = set_sample(set, MEMETIC_SAMPLE, options->seed, control, &sample);
     if (stop)
         goto out;

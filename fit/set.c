@@ -1,43 +1,78 @@
 // SPDX-License-Identifier: MIT
 #include "fit/set.h"
 
+#include "fit/repeats.h"
 #include "fit/rng.h"
+#include "fit/set_rows.h"
+#include "model/channel.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define PI 3.14159265358979323846
 #define EDGE_RAD 1e-9 // the dense zone includes its edges whatever rounding did to them
 
-enum { ARRAYS = 7 };
-
-static int set_new(size_t count, bool with_u, struct fit_set *ret_set)
-{
-    size_t padded = (count + SET_LANES - 1) / SET_LANES * SET_LANES;
-    double *memory = calloc(padded, ARRAYS * sizeof *memory);
-    if (!memory)
-        return FIT_E_MEMORY;
-    *ret_set = (struct fit_set){.count = count, .padded = padded, .memory = memory, .g_scale = 1};
-    double **array[ARRAYS] = {&ret_set->tan2_theta, &ret_set->sin2_beta, &ret_set->cos2_beta,
-                              &ret_set->spec,       &ret_set->diffuse,   &ret_set->f,
-                              &ret_set->u};
-    for (int i = 0; i < ARRAYS; i++)
-        *array[i] = memory + (size_t)i * padded;
-    if (!with_u)
-        ret_set->u = NULL;
-    for (size_t i = count; i < padded; i++)
-        ret_set->cos2_beta[i] = 1;
-    return 0;
-}
-
 void set_free(struct fit_set *set)
 {
-    free(set->memory);
+    for (int i = 0; i < SET_MEMORY; i++)
+        free(set->memory[i]);
     *set = (struct fit_set){.count = 0};
 }
 
-// sqrt(g) of one reading, before scaling: unit is `smallest`, the least u or |f| of the set.
+// --- checks ---------------------------------------------------------------------------------------
+static bool state_ok(const unsigned char *state, size_t i)
+{
+    return !state || state[i] < BRDF_STATES;
+}
+
+static bool reading_ok(const struct fit_data *d, const struct fit_options *o, size_t i)
+{
+    return d->theta_i_rad[i] >= 0 && d->theta_i_rad[i] < PI / 2 && d->theta_r_rad[i] >= 0 &&
+           d->theta_r_rad[i] < PI / 2 && isfinite(d->dphi_rad[i]) && state_ok(d->pol_in, i) &&
+           state_ok(d->pol_out, i) && fabs(d->f_per_sr[i]) <= 1e100 &&
+           (!d->u_per_sr || (d->u_per_sr[i] > 0 && d->u_per_sr[i] <= 1e100)) &&
+           (o->weighting != FIT_RELATIVE || d->f_per_sr[i] != 0);
+}
+
+static enum brdf_state state_at(const unsigned char *state, size_t i)
+{
+    return state ? (enum brdf_state)state[i] : BRDF_STATE_U;
+}
+
+// What the readings say of the set as a whole.
+struct survey {
+    double unit; // the least u (variance weights) or |f| (relative weights), for scaling
+    bool polarised;
+};
+
+static int survey_readings(const struct fit_data *d, const struct fit_options *o,
+                           struct fit_control *control, struct survey *ret_survey)
+{
+    if (d->count < FIT_PARAMS)
+        return FIT_E_FEW_POINTS;
+    struct survey s = {.unit = (double)INFINITY};
+    double largest = 0;
+    for (size_t i = 0; i < d->count; i++) {
+        if (i % CONTROL_SLICE == 0 && control_ask(control))
+            return FIT_E_CANCELED;
+        if (!reading_ok(d, o, i))
+            return FIT_E_DATA;
+        largest = fmax(largest, fabs(d->f_per_sr[i]));
+        s.polarised = s.polarised || state_at(d->pol_in, i) != BRDF_STATE_U ||
+                      state_at(d->pol_out, i) != BRDF_STATE_U;
+        if (o->weighting == FIT_RELATIVE)
+            s.unit = fmin(s.unit, fabs(d->f_per_sr[i]));
+        else if (o->weighting == FIT_VARIANCE)
+            s.unit = fmin(s.unit, d->u_per_sr[i]);
+    }
+    if (largest == 0)
+        return FIT_E_ALL_ZERO;
+    *ret_survey = s;
+    return 0;
+}
+
+// --- weights --------------------------------------------------------------------------------------
+// sqrt(g) of one reading, scaled: unit is the least u or |f| of the set.
 static double root_weight(const struct fit_data *d, const struct fit_options *o, size_t i,
                           double unit)
 {
@@ -55,121 +90,205 @@ static double root_weight(const struct fit_data *d, const struct fit_options *o,
     return 1;
 }
 
-static bool reading_ok(const struct fit_data *d, const struct fit_options *o, size_t i)
+static double g_scale_of(const struct fit_options *o, double unit)
 {
-    return d->theta_i_rad[i] >= 0 && d->theta_i_rad[i] < PI / 2 && d->theta_r_rad[i] >= 0 &&
-           d->theta_r_rad[i] < PI / 2 && isfinite(d->dphi_rad[i]) &&
-           fabs(d->f_per_sr[i]) <= 1e100 &&
-           (!d->u_per_sr || (d->u_per_sr[i] > 0 && d->u_per_sr[i] <= 1e100)) &&
-           (o->weighting != FIT_RELATIVE || d->f_per_sr[i] != 0);
+    switch (o->weighting) {
+    case FIT_UNIFORM: return 1;
+    case FIT_DENSE: return fmax(1, o->dense_g);
+    case FIT_RELATIVE:
+    case FIT_VARIANCE: return 1 / unit / unit;
+    }
+    return 1;
 }
 
-// The least u (variance weights) or |f| (relative weights), for scaling; 0 or a negative fit_stop.
-static int check_readings(const struct fit_data *d, const struct fit_options *o,
-                          struct fit_control *control, double *ret_unit)
+// --- compilation ----------------------------------------------------------------------------------
+// A reading before its weight is multiplied in.
+static void compile_reading(const struct fit_data *d, const struct fit_options *o, size_t i,
+                            double unit, struct set_rows *r)
 {
-    if (d->count < FIT_PARAMS)
-        return FIT_E_FEW_POINTS;
-    double unit = (double)INFINITY, largest = 0;
+    struct brdf_geometry g = brdf_geometry(d->theta_i_rad[i], d->theta_r_rad[i], d->dphi_rad[i]);
+    r->tan2_theta[i] = g.tan2_theta;
+    r->cos_beta[i] = sqrt(g.cos2_beta);
+    r->spec[i] = g.spec_per_sr;
+    r->diffuse[i] = o->diffuse == BRDF_DIFFUSE_PAPER ? g.inv_cos_i : 1 / PI;
+    r->root_g[i] = root_weight(d, o, i, unit);
+    r->f[i] = d->f_per_sr[i] * r->root_g[i];
+    if (!r->channel[0])
+        return;
+    struct brdf_channel c = brdf_channel(&g, state_at(d->pol_in, i), state_at(d->pol_out, i));
+    r->diffuse[i] *= c.w_kd;
+    r->channel[SET_SS][i] = g.spec_per_sr * c.w_ss;
+    r->channel[SET_PP][i] = g.spec_per_sr * c.w_pp;
+    r->channel[SET_RE][i] = g.spec_per_sr * c.w_re;
+    r->channel[SET_IM][i] = g.spec_per_sr * c.w_im;
+}
+
+static int compile_readings(const struct fit_data *d, const struct fit_options *o, double unit,
+                            struct fit_control *control, struct fit_set *s)
+{
     for (size_t i = 0; i < d->count; i++) {
-        if (i % CONTROL_SLICE == 0 && control_ask(control))
+        // Trigonometry: some 100 ns a reading, so the slice is shorter.
+        if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control))
             return FIT_E_CANCELED;
-        if (!reading_ok(d, o, i))
-            return FIT_E_DATA;
-        largest = fmax(largest, fabs(d->f_per_sr[i]));
-        if (o->weighting == FIT_RELATIVE)
-            unit = fmin(unit, fabs(d->f_per_sr[i]));
-        else if (o->weighting == FIT_VARIANCE)
-            unit = fmin(unit, d->u_per_sr[i]);
+        compile_reading(d, o, i, unit, &s->all);
+        if (s->u)
+            s->u[i] = d->u_per_sr[i] * s->all.root_g[i];
     }
-    if (largest == 0)
-        return FIT_E_ALL_ZERO;
-    *ret_unit = unit;
     return 0;
 }
 
-static void compile_reading(const struct fit_data *d, const struct fit_options *o, size_t i,
-                            double unit, struct fit_set *s)
+static int find_distinct(struct fit_control *control, struct fit_set *s)
 {
-    double w = root_weight(d, o, i, unit);
-    struct brdf_geometry g = brdf_geometry(d->theta_i_rad[i], d->theta_r_rad[i], d->dphi_rad[i]);
-    s->tan2_theta[i] = g.tan2_theta;
-    s->sin2_beta[i] = g.sin2_beta;
-    s->cos2_beta[i] = g.cos2_beta;
-    s->spec[i] = w * g.spec_per_sr;
-    s->diffuse[i] = w * (o->diffuse == BRDF_DIFFUSE_PAPER ? g.inv_cos_i : 1 / PI);
-    s->f[i] = w * d->f_per_sr[i];
-    if (s->u)
-        s->u[i] = w * d->u_per_sr[i];
+    size_t groups;
+    s->row = s->memory[2] = malloc(s->count * sizeof *s->row);
+    if (!s->row)
+        return FIT_E_MEMORY;
+    const double *column[SET_ARRAYS];
+    int columns = set_rows_geometry(&s->all, column);
+    int e = repeats_find(column, columns, s->count, control, s->row, &groups);
+    if (e || groups == s->count) {
+        s->row = NULL;
+        s->distinct = s->all;
+        return e;
+    }
+    e = set_rows_new(groups, s->all.channel[0] != NULL, &s->distinct, &s->memory[1]);
+    return e ? e : set_rows_merge(&s->all, s->row, control, &s->distinct);
 }
 
-static void sum_constants(struct fit_set *s)
+static int compile(const struct fit_data *d, const struct fit_options *o, double unit,
+                   struct fit_control *control, struct fit_set *s)
 {
-    s->bb = s->ff = 0;
-    for (size_t i = 0; i < s->count; i++) {
-        s->bb += s->diffuse[i] * s->diffuse[i];
-        s->ff += s->f[i] * s->f[i];
-    }
+    int e = compile_readings(d, o, unit, control, s);
+    if (e == 0)
+        e = find_distinct(control, s);
+    if (e == 0)
+        e = set_rows_weigh(&s->all, control);
+    if (e == 0 && s->row)
+        e = set_rows_weigh(&s->distinct, control);
+    if (e == 0)
+        e = set_revalue(s, control);
+    return e ? e : s->ff > 0 ? 0 : FIT_E_ALL_ZERO; // readings so small that their squares vanish
 }
 
 int set_compile(const struct fit_data *d, const struct fit_options *o, struct fit_control *control,
                 struct fit_set *ret_set)
 {
-    double unit;
-    struct fit_set s;
-    int e = check_readings(d, o, control, &unit);
-    if (e == 0)
-        e = set_new(d->count, d->u_per_sr != NULL, &s);
+    struct survey survey;
+    int e = survey_readings(d, o, control, &survey);
     if (e)
         return e;
-    if (o->weighting == FIT_RELATIVE || o->weighting == FIT_VARIANCE)
-        s.g_scale = 1 / unit / unit;
-    else if (o->weighting == FIT_DENSE)
-        s.g_scale = fmax(1, o->dense_g);
-    for (size_t i = 0; i < d->count; i++) {
-        // Trigonometry: some 100 ns a reading, so the slice is shorter.
-        if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control)) {
-            set_free(&s);
-            return FIT_E_CANCELED;
-        }
-        compile_reading(d, o, i, unit, &s);
+    struct fit_set s = {.g_scale = g_scale_of(o, survey.unit), .level = batch_best_level()};
+    e = set_rows_new(d->count, survey.polarised, &s.all, &s.memory[0]);
+    s.count = s.all.count;
+    s.padded = s.all.padded;
+    if (e == 0 && d->u_per_sr) {
+        s.u = s.memory[3] = calloc(s.padded, sizeof *s.u);
+        e = s.u ? 0 : FIT_E_MEMORY;
     }
-    sum_constants(&s);
-    if (!(s.ff > 0)) { // readings so small that their squares vanish
+    if (e == 0)
+        e = compile(d, o, survey.unit, control, &s);
+    if (e)
         set_free(&s);
-        return FIT_E_ALL_ZERO;
+    else
+        *ret_set = s;
+    return e;
+}
+
+// --- values ---------------------------------------------------------------------------------------
+// sqrt(G) times the weighted mean of each row's readings.
+static int mean_values(struct fit_set *s, struct fit_control *control)
+{
+    double *f = s->distinct.f;
+    for (size_t i = 0; i < s->distinct.count; i++)
+        f[i] = 0;
+    for (size_t i = 0; i < s->count; i++) {
+        if (i % CONTROL_SLICE == 0 && control_ask(control))
+            return FIT_E_CANCELED;
+        f[s->row[i]] += s->all.root_g[i] * s->all.f[i];
     }
+    for (size_t i = 0; i < s->distinct.count; i++)
+        f[i] /= s->distinct.root_g[i] > 0 ? s->distinct.root_g[i] : 1;
+    return 0;
+}
+
+static double off_mean(const struct fit_set *s, size_t i)
+{
+    size_t row = s->row[i];
+    double g = s->distinct.root_g[row];
+    return g > 0 ? s->all.f[i] - s->all.root_g[i] / g * s->distinct.f[row] : 0;
+}
+
+int set_revalue(struct fit_set *s, struct fit_control *control)
+{
+    if (!s->row)
+        s->distinct.f = s->all.f;
+    else if (mean_values(s, control))
+        return FIT_E_CANCELED;
+    s->ff = s->scatter = 0;
+    for (size_t i = 0; i < s->count; i++) {
+        if (i % CONTROL_SLICE == 0 && control_ask(control))
+            return FIT_E_CANCELED;
+        double off = s->row ? off_mean(s, i) : 0;
+        s->ff += s->all.f[i] * s->all.f[i];
+        s->scatter += off * off;
+    }
+    return 0;
+}
+
+int set_replica(const struct fit_set *set, struct fit_set *ret_set)
+{
+    struct fit_set s = *set;
+    for (int i = 0; i < SET_MEMORY; i++)
+        s.memory[i] = NULL;
+    size_t own = s.padded + (s.row ? s.distinct.padded : 0);
+    double *f = s.memory[0] = calloc(own, sizeof *f);
+    if (!f)
+        return FIT_E_MEMORY;
+    s.all.f = f;
+    s.distinct.f = s.row ? f + s.padded : f;
+    for (size_t i = 0; i < s.count; i++)
+        s.all.f[i] = set->all.f[i];
+    for (size_t i = 0; i < s.distinct.count; i++)
+        s.distinct.f[i] = set->distinct.f[i];
     *ret_set = s;
+    return 0;
+}
+
+// --- samples --------------------------------------------------------------------------------------
+static int draw_rows(const struct set_rows *from, struct rng *rng, struct fit_control *control,
+                     struct set_rows *to)
+{
+    size_t taken = 0;
+    for (size_t i = 0; taken < to->count; i++) { // selection sampling (Knuth 3.4.2 S)
+        if (i % CONTROL_SLICE == 0 && control_ask(control))
+            return FIT_E_CANCELED;
+        if (rng_below(rng, from->count - i) < to->count - taken)
+            set_rows_copy(from, i, to, taken++);
+    }
     return 0;
 }
 
 int set_sample(const struct fit_set *set, size_t count, uint64_t seed, struct fit_control *control,
                struct fit_set *ret_set)
 {
-    struct fit_set s;
+    const struct set_rows *source = &set->distinct;
+    struct fit_set s = {.g_scale = set->g_scale, .level = set->level};
     struct rng rng;
     rng_seed(&rng, seed);
-    if (count > set->count)
-        count = set->count;
-    int e = set_new(count, false, &s);
+    if (count > source->count)
+        count = source->count;
+    int e = set_rows_new(count, source->channel[0] != NULL, &s.all, &s.memory[0]);
     if (e)
         return e;
-    size_t taken = 0;
-    for (size_t i = 0; taken < count; i++) { // selection sampling (Knuth 3.4.2 S)
-        if (i % CONTROL_SLICE == 0 && control_ask(control)) {
-            set_free(&s);
-            return FIT_E_CANCELED;
-        }
-        if (rng_below(&rng, set->count - i) >= count - taken)
-            continue;
-        s.tan2_theta[taken] = set->tan2_theta[i];
-        s.sin2_beta[taken] = set->sin2_beta[i];
-        s.cos2_beta[taken] = set->cos2_beta[i];
-        s.spec[taken] = set->spec[i];
-        s.diffuse[taken] = set->diffuse[i];
-        s.f[taken++] = set->f[i];
-    }
-    sum_constants(&s);
-    *ret_set = s;
-    return 0;
+    e = draw_rows(source, &rng, control, &s.all);
+    s.count = s.all.count;
+    s.padded = s.all.padded;
+    s.distinct = s.all;
+    if (e == 0)
+        e = set_revalue(&s, control);
+    if (e)
+        set_free(&s);
+    else
+        *ret_set = s;
+    return e;
 }

@@ -34,7 +34,12 @@ static inline void readings_add(struct readings *r, double theta_i_deg, double t
 
 static inline struct fit_data readings_data(const struct readings *r, bool with_u)
 {
-    return (struct fit_data){r->count, r->ti, r->tr, r->dphi, r->f, with_u ? r->u : NULL};
+    return (struct fit_data){.count = r->count,
+                             .theta_i_rad = r->ti,
+                             .theta_r_rad = r->tr,
+                             .dphi_rad = r->dphi,
+                             .f_per_sr = r->f,
+                             .u_per_sr = with_u ? r->u : NULL};
 }
 
 // Positive values of `column` at theta_i up to theta_i_max_deg; false when the file is absent.

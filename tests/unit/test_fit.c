@@ -221,7 +221,8 @@ static void one_direction_identifies_nothing(void **state)
         d[j] = 3.14159265358979;
         f[j] = 0.5;
     }
-    const struct fit_data data = {N, i, r, d, f, NULL};
+    const struct fit_data data = {
+        .count = N, .theta_i_rad = i, .theta_r_rad = r, .dphi_rad = d, .f_per_sr = f};
     const struct fit_options o = fit_options_default();
     struct fit_result result;
     assert_int_equal(fit_run(&data, &o, &result), 0);

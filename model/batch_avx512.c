@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: MIT
+#include "model/batch_level.h"
+
+#ifdef __x86_64__
+#define BATCH batch_passes_avx512
+#include "model/batch_pass.h"
+#endif
