@@ -8,18 +8,16 @@
 
 #include <string.h>
 
-#define INLINE static inline __attribute__((always_inline))
-
 struct levels { // ks, kd in every lane
     vec ks, kd;
 };
 
-INLINE vec residual_at(const struct set_rows *s, size_t i, vec a, vec b, struct levels x)
+BATCH_INLINE vec residual_at(const struct set_rows *s, size_t i, vec a, vec b, struct levels x)
 {
     return vec_load(s->f + i) - x.ks * a - x.kd * b;
 }
 
-INLINE void load_channel(const struct set_rows *s, size_t i, vec w[SET_CHANNELS])
+BATCH_INLINE void load_channel(const struct set_rows *s, size_t i, vec w[SET_CHANNELS])
 {
     for (int c = 0; c < SET_CHANNELS; c++)
         w[c] = vec_load(s->channel[c] + i);
@@ -28,22 +26,24 @@ INLINE void load_channel(const struct set_rows *s, size_t i, vec w[SET_CHANNELS]
 // --- inner products -------------------------------------------------------------------------------
 // Everything stays in registers: with the sums as a pass of its own over a stored a, this took a
 // quarter longer. a is short of the factor `lead`, the same for all rows.
-INLINE void sum_moments(const struct set_rows *s, size_t from, size_t to,
-                        const struct batch_point *p, double ks, double kd, bool polarised,
-                        struct kernel_products *ret)
+enum kind { BRIGHT, FOLDING, POLARISED }; // F; F where Re is negative somewhere; a channel
+
+BATCH_INLINE void sum_moments(const struct set_rows *s, size_t from, size_t to,
+                              const struct batch_point *p, double ks, double kd, enum kind kind,
+                              struct kernel_products *ret)
 {
-    const double lead = polarised ? p->v : p->v * p->w;
+    const double lead = kind == POLARISED ? p->v : 4 * p->v * p->w;
     const struct levels x = {vec_all(ks * lead), vec_all(kd)};
     vec aa = {0}, ab = {0}, ar = {0}, bb = {0}, br = {0}, rr = {0};
     for (size_t i = from; i < to; i += VEC_LANES) {
         vec a = lobe_at(p, s->tan2_theta + i), b = vec_load(s->diffuse + i);
         struct facet g = facet_at(s->cos_beta + i);
-        if (polarised) {
+        if (kind == POLARISED) {
             vec w[SET_CHANNELS];
             load_channel(s, i, w);
             a *= channel_slope(p, g, w).f;
         } else {
-            a *= vec_load(s->spec + i) * fresnel_mean(p, g);
+            a = mean_value(p, g, a * vec_load(s->spec + i), kind == FOLDING);
         }
         vec r = residual_at(s, i, a, b, x);
         aa = vec_fma(a, a, aa);
@@ -62,13 +62,15 @@ static void moments(const struct set_rows *s, size_t from, size_t to,
 {
     const struct batch_point p = *point;
     if (s->channel[0])
-        sum_moments(s, from, to, &p, ks, kd, true, ret);
+        sum_moments(s, from, to, &p, ks, kd, POLARISED, ret);
+    else if (batch_folds(&p))
+        sum_moments(s, from, to, &p, ks, kd, FOLDING, ret);
     else
-        sum_moments(s, from, to, &p, ks, kd, false, ret);
+        sum_moments(s, from, to, &p, ks, kd, BRIGHT, ret);
 }
 
 // --- columns --------------------------------------------------------------------------------------
-INLINE void fill_columns(const struct set_rows *s, size_t at, size_t count,
+BATCH_INLINE void fill_columns(const struct set_rows *s, size_t at, size_t count,
                          const struct batch_point *p, double ks, double kd, bool polarised,
                          double (*column)[KERNEL_BLOCK])
 {
@@ -83,7 +85,7 @@ INLINE void fill_columns(const struct set_rows *s, size_t at, size_t count,
             load_channel(s, i, w);
             f = channel_slope(p, g, w);
         } else {
-            f = fresnel_slope(p, g);
+            f = mean_slope(p, g);
             height *= vec_load(s->spec + i);
         }
         vec a = height * f.f;
@@ -108,7 +110,7 @@ static void columns(const struct set_rows *s, size_t at, size_t count,
 }
 
 // --- all inner products ---------------------------------------------------------------------------
-INLINE void add_row(const double (*column)[KERNEL_BLOCK], size_t count, int row,
+BATCH_INLINE void add_row(const double (*column)[KERNEL_BLOCK], size_t count, int row,
                     vec total[KERNEL_COLUMNS])
 {
     vec sum[KERNEL_COLUMNS];

@@ -4,16 +4,25 @@
 #include "model/batch_level.h"
 #include "model/batch_vec.h"
 
+BATCH_INLINE void f00_any(const struct batch *b, const struct batch_point *p, double ks, double kd,
+                          bool folds, double *restrict f)
+{
+    const vec lead = vec_all(4 * ks * p->v * p->w), diffuse = vec_all(kd);
+    for (size_t i = 0; i < b->padded; i += VEC_LANES) {
+        vec height = vec_load(b->spec + i) * lobe_at(p, b->tan2_theta + i);
+        vec one = mean_value(p, facet_at(b->cos_beta + i), height, folds);
+        vec_store(f + i, vec_fma(lead, one, diffuse * vec_load(b->diffuse + i)));
+    }
+}
+
 static void f00(const struct batch *b, const struct batch_point *point, double ks, double kd,
                 double *restrict f)
 {
     const struct batch_point p = *point;
-    const vec lead = vec_all(ks * p.v * p.w), diffuse = vec_all(kd);
-    for (size_t i = 0; i < b->padded; i += VEC_LANES) {
-        vec height = vec_load(b->spec + i) * lobe_at(&p, b->tan2_theta + i);
-        vec one = height * fresnel_mean(&p, facet_at(b->cos_beta + i));
-        vec_store(f + i, vec_fma(lead, one, diffuse * vec_load(b->diffuse + i)));
-    }
+    if (batch_folds(&p))
+        f00_any(b, &p, ks, kd, true, f);
+    else
+        f00_any(b, &p, ks, kd, false, f);
 }
 
 static void jacobian(const struct batch *b, const struct batch_point *point, double ks, double kd,
@@ -25,7 +34,7 @@ static void jacobian(const struct batch *b, const struct batch_point *point, dou
     const vec strength = vec_all(ks), diffuse = vec_all(kd), v = vec_all(p.v);
     for (size_t i = 0; i < b->padded; i += VEC_LANES) {
         vec height = v * vec_load(b->spec + i) * lobe_at(&p, b->tan2_theta + i);
-        struct slope s = fresnel_slope(&p, facet_at(b->cos_beta + i));
+        struct slope s = mean_slope(&p, facet_at(b->cos_beta + i));
         vec specular = strength * height * s.f, level = vec_load(b->diffuse + i);
         vec_store(dn + i, strength * height * s.n);
         vec_store(dk + i, strength * height * s.k);

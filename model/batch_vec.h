@@ -12,39 +12,51 @@
 //   |rs|^2: T      |rp|^2: |s^2 - q c|^2      Re(rs rp*): s^4 - m c^2      Im(rs rp*): 2 s^2 c b
 //   F = (|rs|^2 + |rp|^2)/2: Z
 //
-// Nothing cancels: Re(N^2 - s^2) = Re(N^2 - 1) + c^2, and of a and b the larger one is the square
-// root of (m + |Re|)/2, the other n k over it.
+// Nothing cancels: Re(N^2 - s^2) = Re(N^2 - 1) + c^2 =: Re, and of a and b the larger one is the
+// square root of (m + |Re|)/2, the other n k over it. A doubled letter is twice the quantity: the
+// square roots come out without factors then, and doubling is an addition, which the machine has to
+// spare.
 #pragma once
 #include "model/batch.h"
 #include "model/vec.h"
 
-#define BATCH_TINY 1e-300 // keeps 0/0 out, changes nothing else
+// Keeps m from 0, so that there is no 0/0 and no other special case; changes nothing else.
+#define BATCH_TINY 1e-100
+
+#define BATCH_INLINE static inline __attribute__((always_inline))
 
 struct facet {
-    vec c, c2, s2;
+    vec c, cc, c2, cc2, s2, ss4; // cc2: twice c^2; ss4: twice s^4
 };
 
-static inline struct facet facet_at(const double *cos_beta)
+BATCH_INLINE struct facet facet_at(const double *cos_beta)
 {
-    vec c = vec_load(cos_beta), c2 = c * c;
-    return (struct facet){c, c2, 1 - c2};
+    vec c = vec_load(cos_beta), c2 = c * c, cc2 = c2 + c2, s2 = 1 - c2;
+    return (struct facet){c, c + c, c2, cc2, s2, s2 * (2 - cc2)};
 }
 
 // exp(-v tan^2 theta)
-static inline vec lobe_at(const struct batch_point *p, const double *tan2_theta)
+BATCH_INLINE vec lobe_at(const struct batch_point *p, const double *tan2_theta)
 {
     return vec_exp2(vec_max(vec_load(tan2_theta) * vec_all(p->exp2_scale), vec_all(p->exp2_least)));
 }
 
-// F/W. One division, one square root and one folded one: where the kernels spend their time.
-static inline vec fresnel_mean(const struct batch_point *p, struct facet g)
+// Re is negative somewhere.
+static inline bool batch_folds(const struct batch_point *p)
 {
-    vec re = vec_all(p->above) + g.c2;
-    vec m = vec_sqrt(vec_fma(re, re, vec_all(p->im2)));
-    vec y = vec_fold(re, m + vec_abs(re) + BATCH_TINY, vec_all(p->im)) * (g.c * sqrt(2.0));
-    vec z = vec_fma(m, g.c2, g.s2 * g.s2);
-    vec s = m + g.c2 + y, t = vec_fma(y, g.s2, z);
-    return z / (s * s * t + BATCH_TINY);
+    return p->above < 0;
+}
+
+// height F/(4 W): where the kernels spend their time.
+BATCH_INLINE vec mean_value(const struct batch_point *p, struct facet g, vec height, bool folds)
+{
+    vec re = vec_all(2 * p->above) + g.cc2;
+    vec mm = vec_sqrt(vec_fma(re, re, vec_all(4 * p->im2 + BATCH_TINY)));
+    vec larger = mm + vec_abs(re);
+    vec yy = folds ? vec_folded(re, larger, vec_all(2 * p->im), g.cc) : vec_scaled(larger, g.cc);
+    vec zz = vec_fma(mm, g.c2, g.ss4);
+    vec ss = mm + g.cc2 + yy, tt = vec_fma(yy, g.s2, zz);
+    return height * zz / (ss * ss * tt);
 }
 
 // --- derivatives ----------------------------------------------------------------------------------
@@ -53,7 +65,7 @@ struct slope {
     vec f, n, k;
 };
 
-// From dq/dn = N/q and dq/dk = iN/q:
+// Twice m, y and b. From dq/dn = N/q and dq/dk = iN/q:
 //
 //   m_n = 2 n (Re + 2 kappa)/m      a_n = (n a + k b)/m          b_n = (k a - n b)/m
 //   m_kappa = (2 n^2 - Re)/m        a_kappa = (n b/k - a)/(2 m)  b_kappa = (n a/k + b)/(2 m)
@@ -63,70 +75,75 @@ struct slope {
 // BATCH_K_LEAST makes finite: a step downhill from there is short but leaves, and the next ones see
 // the true slope.
 struct root {
-    struct slope m, y, b;
+    struct slope mm, yy, bb;
 };
 
-static inline struct root root_at(const struct batch_point *p, struct facet g)
+BATCH_INLINE struct root root_at(const struct batch_point *p, struct facet g)
 {
-    vec n = vec_all(p->n), k = vec_all(p->k), kappa = vec_all(p->kappa);
-    vec re = vec_all(p->above) + g.c2, least = vec_all(BATCH_M_LEAST * BATCH_M_LEAST);
-    vec m, inv_m, large, inv_large;
-    vec_root(vec_max(vec_fma(re, re, vec_all(p->im2)), least), &m, &inv_m);
-    vec_root((m + vec_abs(re)) * 0.5, &large, &inv_large);
-    vec small_k = n * inv_large, small = k * small_k, large_k = vec_all(p->inv_k) * large;
-    vec a = vec_choose(re, small, large), a_k = vec_choose(re, small_k, large_k);
-    vec b = vec_choose(re, large, small), b_k = vec_choose(re, large_k, small_k);
+    vec n = vec_all(p->n), k = vec_all(p->k);
+    vec re = vec_all(2 * p->above) + g.cc2;
+    vec least = vec_all(4 * BATCH_M_LEAST * BATCH_M_LEAST), mm, inv, large, inv_large;
+    vec_root(vec_max(vec_fma(re, re, vec_all(4 * p->im2)), least), &mm, &inv);
+    vec_root(mm + vec_abs(re), &large, &inv_large);
+    vec small_k = vec_all(4 * p->n) * inv_large, small = k * small_k;
+    vec large_k = vec_all(p->inv_k) * large;
+    vec aa = vec_choose(re, small, large), aa_k = vec_choose(re, small_k, large_k);
+    vec bb = vec_choose(re, large, small), bb_k = vec_choose(re, large_k, small_k);
+    vec c_inv = g.cc * inv;
     return (struct root){
-        .m = {m, 2 * n * (re + 2 * kappa) * inv_m, (2 * n * n - re) * inv_m},
-        .y = {2 * g.c * a, 2 * g.c * (n * a + k * b) * inv_m, g.c * (n * b_k - a) * inv_m},
-        .b = {b, (k * a - n * b) * inv_m, (n * a_k + b) * inv_m * 0.5},
+        .mm = {mm, vec_all(4 * p->n) * (re + 4 * p->kappa) * inv,
+               (vec_all(8 * p->n * p->n) - (re + re)) * inv},
+        .yy = {g.cc * aa, (c_inv + c_inv) * vec_fma(n, aa, k * bb), c_inv * (n * bb_k - aa)},
+        .bb = {bb, (inv + inv) * (k * aa - n * bb), inv * vec_fma(n, aa_k, bb)},
     };
 }
 
-// Q of the mean.
-static inline struct slope mean_at(const struct root *r, struct facet g)
+// QQ of the mean.
+BATCH_INLINE struct slope mean_at(const struct root *r, struct facet g)
 {
-    return (struct slope){vec_fma(r->m.f, g.c2, g.s2 * g.s2), r->m.n * g.c2, r->m.k * g.c2};
+    return (struct slope){vec_fma(r->mm.f, g.c2, g.ss4), r->mm.n * g.c2, r->mm.k * g.c2};
 }
 
-// Q of a channel with the weights w (model/channel.h): ss, pp, re, im.
-static inline struct slope channel_at(const struct root *r, struct facet g, const vec w[4])
+// QQ of a channel with the weights w (model/channel.h): ss, pp, re, im.
+BATCH_INLINE struct slope channel_at(const struct root *r, struct facet g, const vec w[4])
 {
-    struct slope z = mean_at(r, g);
-    vec part = g.s2 - r->y.f * 0.5, cb = g.c * r->b.f, s4 = g.s2 * g.s2;
-    vec by_z = w[0] + w[1] - w[2], by_y = (w[0] - w[1]) * g.s2, by_b = w[3] * (2 * g.s2 * g.c);
+    struct slope zz = mean_at(r, g);
+    vec sc = g.s2 * g.cc, cb = g.c * r->bb.f, part = 2 * g.s2 - 0.5 * r->yy.f;
+    vec by_z = w[0] + w[1] - w[2], by_y = (w[0] - w[1]) * g.s2, by_b = w[3] * sc;
+    vec pp = 0.5 * vec_fma(part, part, cb * cb);
     return (struct slope){
-        .f = w[0] * vec_fma(r->y.f, g.s2, z.f) + w[1] * vec_fma(part, part, cb * cb) +
-             w[2] * (s4 - r->m.f * g.c2) + by_b * r->b.f,
-        .n = by_z * z.n + by_y * r->y.n + by_b * r->b.n,
-        .k = by_z * z.k + by_y * r->y.k + by_b * r->b.k,
+        .f = w[0] * vec_fma(r->yy.f, g.s2, zz.f) + w[1] * pp + w[2] * (g.ss4 - r->mm.f * g.c2) +
+             by_b * r->bb.f,
+        .n = by_z * zz.n + by_y * r->yy.n + by_b * r->bb.n,
+        .k = by_z * zz.k + by_y * r->yy.k + by_b * r->bb.k,
     };
 }
 
-// W Q/(S^2 T).
-static inline struct slope reflectance(const struct batch_point *p, const struct root *r,
-                                       struct facet g, struct slope q)
+// W Q/(S^2 T), given QQ.
+BATCH_INLINE struct slope reflectance(const struct batch_point *p, const struct root *r,
+                                      struct facet g, struct slope qq)
 {
-    struct slope z = mean_at(r, g);
-    vec s = r->m.f + g.c2 + r->y.f, t = vec_fma(r->y.f, g.s2, z.f), w = vec_all(p->w);
-    vec s_s = s * s, s_t2 = 2 * s * t, norm = 1 / (s_s * t + BATCH_TINY), f = w * q.f * norm;
-    vec down_n = vec_fma(s_t2, r->m.n + r->y.n, s_s * vec_fma(r->y.n, g.s2, z.n));
-    vec down_k = vec_fma(s_t2, r->m.k + r->y.k, s_s * vec_fma(r->y.k, g.s2, z.k));
+    struct slope zz = mean_at(r, g);
+    vec ss = r->mm.f + g.cc2 + r->yy.f, tt = vec_fma(r->yy.f, g.s2, zz.f);
+    vec s_s = ss * ss, s_t = ss * tt, norm = 4 / (s_s * tt), w = vec_all(p->w);
+    vec f = w * qq.f * norm, part = 0.25 * f;
+    s_t = s_t + s_t;
+    vec down_n = vec_fma(s_t, r->mm.n + r->yy.n, s_s * vec_fma(r->yy.n, g.s2, zz.n));
+    vec down_k = vec_fma(s_t, r->mm.k + r->yy.k, s_s * vec_fma(r->yy.k, g.s2, zz.k));
     return (struct slope){
         .f = f,
-        .n = (vec_all(p->wn) * q.f + w * q.n - f * down_n) * norm,
-        .k = (vec_all(p->wk) * q.f + w * q.k - f * down_k) * norm,
+        .n = (vec_all(p->wn) * qq.f + w * qq.n - part * down_n) * norm,
+        .k = (vec_all(p->wk) * qq.f + w * qq.k - part * down_k) * norm,
     };
 }
 
-static inline struct slope fresnel_slope(const struct batch_point *p, struct facet g)
+BATCH_INLINE struct slope mean_slope(const struct batch_point *p, struct facet g)
 {
     struct root r = root_at(p, g);
     return reflectance(p, &r, g, mean_at(&r, g));
 }
 
-static inline struct slope channel_slope(const struct batch_point *p, struct facet g,
-                                         const vec w[4])
+BATCH_INLINE struct slope channel_slope(const struct batch_point *p, struct facet g, const vec w[4])
 {
     struct root r = root_at(p, g);
     return reflectance(p, &r, g, channel_at(&r, g, w));

@@ -56,15 +56,16 @@ static inline double vec_sum(vec v)
     return s[0];
 }
 
-// --- what differs --------------------------------------------------------------------------------
+// --- what differs ---------------------------------------------------------------------------------
 // vec_all     a number in every lane
 // vec_fma     a b + c, rounded once where the machine can
 // vec_max
 // vec_choose  of each lane: negative where sign's lane is below 0 (or is -0), else positive
 // vec_sqrt    correctly rounded
-// vec_root    sqrt(x) and its reciprocal, to 2 units in the last place; x in [1e-300, 1e300]
-// vec_fold    sqrt(x) where sign >= 0, im/sqrt(x) where sign < 0, likewise
-// vec_exp2    2^y to 1e-15; y in [-1020, 1020]
+// vec_scaled  scale sqrt(x), to 2 units in the last place; x in [1e-300, 1e300]
+// vec_folded  likewise, and scale im/sqrt(x) where sign is negative
+// vec_root    sqrt(x) and its reciprocal, likewise
+// vec_exp2    2^y to 5e-15; y in [-1020, 1020]
 
 #if VEC_LANES == 8
 static inline vec vec_all(double x) { return _mm512_set1_pd(x); }
@@ -78,52 +79,59 @@ static inline vec vec_choose(vec sign, vec negative, vec positive)
                                 negative);
 }
 
-// What is missing to the estimate r of 1/sqrt(x): the factor 1 + c, from the series of
+// value (1 + c), where 1 + c is what is missing to the estimate r of 1/sqrt(x): from the series of
 // (1 - e)^(-1/2) with e = 1 - x r^2, |e| < 2^-13.
-static inline vec vec_root_correction(vec x_r, vec r)
+static inline vec vec_refined(vec value, vec x_r, vec r)
 {
     vec e = _mm512_fnmadd_pd(x_r, r, vec_all(1));
     vec series = vec_fma(e, vec_fma(e, vec_all(0.3125), vec_all(0.375)), vec_all(0.5));
-    return e * series;
+    return vec_fma(value * e, series, value);
+}
+
+static inline vec vec_scaled(vec x, vec scale)
+{
+    vec r = _mm512_rsqrt14_pd(x), x_r = x * r;
+    return vec_refined(x_r * scale, x_r, r);
+}
+
+static inline vec vec_folded(vec sign, vec x, vec im, vec scale)
+{
+    vec r = _mm512_rsqrt14_pd(x), x_r = x * r;
+    return vec_refined(vec_choose(sign, im * r, x_r) * scale, x_r, r);
 }
 
 static inline void vec_root(vec x, vec *ret_root, vec *ret_inverse)
 {
-    vec r = _mm512_rsqrt14_pd(x), x_r = x * r, c = vec_root_correction(x_r, r);
-    *ret_root = vec_fma(x_r, c, x_r);
-    *ret_inverse = vec_fma(r, c, r);
+    vec r = _mm512_rsqrt14_pd(x), x_r = x * r;
+    *ret_root = vec_refined(x_r, x_r, r);
+    *ret_inverse = vec_refined(r, x_r, r);
 }
 
-static inline vec vec_fold(vec sign, vec x, vec im)
-{
-    vec r = _mm512_rsqrt14_pd(x), x_r = x * r, c = vec_root_correction(x_r, r);
-    vec root = vec_choose(sign, im * r, x_r);
-    return vec_fma(root, c, root);
-}
-
-// 2^y = 2^(j/8) 2^f, |f| <= 1/16; minimax polynomial of f, relative error 9e-16. Adding 1.5 * 2^49
-// leaves y in eighths in the low bits; the table's entries have j taken out of the place where j,
-// shifted along with the exponent, comes to lie.
+// 2^y = 2^(j/16) 2^f, |f| <= 1/32; minimax polynomial of f, relative error 4.5e-15. Adding
+// 1.5 * 2^48 leaves y in sixteenths in the low bits. E takes j out of the place in the table's entry
+// where j, shifted along with the exponent, comes to lie.
 static inline vec vec_exp2(vec y)
 {
-#define EIGHTH(j, bits) (bits##ull - ((uint64_t)(j) << 49))
-    const vec_bits table = {
-        EIGHTH(0, 0x3ff0000000000000), EIGHTH(1, 0x3ff172b83c7d517b), EIGHTH(2, 0x3ff306fe0a31b715),
-        EIGHTH(3, 0x3ff4bfdad5362a27), EIGHTH(4, 0x3ff6a09e667f3bcd), EIGHTH(5, 0x3ff8ace5422aa0db),
-        EIGHTH(6, 0x3ffae89f995ad3ad), EIGHTH(7, 0x3ffd5818dcfba487)};
-#undef EIGHTH
-    const vec magic = vec_all(0x1.8p49);
+#define E(j, bits) (int64_t)(bits##ull - ((uint64_t)(j) << 48))
+    const int64_t table[16] = {
+        E(0, 0x3ff0000000000000), E(1, 0x3ff0b5586cf9890f), E(2, 0x3ff172b83c7d517b), E(3, 0x3ff2387a6e756238),
+        E(4, 0x3ff306fe0a31b715), E(5, 0x3ff3dea64c123422), E(6, 0x3ff4bfdad5362a27), E(7, 0x3ff5ab07dd485429),
+        E(8, 0x3ff6a09e667f3bcd), E(9, 0x3ff7a11473eb0187), E(10, 0x3ff8ace5422aa0db), E(11, 0x3ff9c49182a3f090),
+        E(12, 0x3ffae89f995ad3ad), E(13, 0x3ffc199bdd85529c), E(14, 0x3ffd5818dcfba487), E(15, 0x3ffea4afa2a490da),
+    };
+#undef E
+    const vec magic = vec_all(0x1.8p48);
     vec shifted = y + magic;
     vec f = y - (shifted - magic);
-    vec p = vec_fma(f, vec_all(0x1.4317c8f2fc5dfp-13), vec_all(0x1.5d8f116167897p-10));
-    p = vec_fma(f, p, vec_all(0x1.3b2ab6ca122e9p-7));
-    p = vec_fma(f, p, vec_all(0x1.c6b08d53aecd2p-5));
-    p = vec_fma(f, p, vec_all(0x1.ebfbdff82ce54p-3));
-    p = vec_fma(f, p, vec_all(0x1.62e42fefa3d8dp-1));
-    p = vec_fma(f, p, vec_all(1));
-    vec_bits root =
-        (vec_bits)_mm512_permutexvar_epi64(_mm512_castpd_si512(shifted), (__m512i)table);
-    return p * (vec)(root + ((vec_bits)shifted << 49));
+    vec p = vec_fma(f, vec_all(0x1.5d867e9c0d6e4p-10), vec_all(0x1.3b2c9b8648e62p-7));
+    p = vec_fma(f, p, vec_all(0x1.c6b08d76a9691p-5));
+    p = vec_fma(f, p, vec_all(0x1.ebfbdff55592dp-3));
+    p = vec_fma(f, p, vec_all(0x1.62e42fefa397bp-1));
+    p = vec_fma(f, p, vec_all(0x1.0000000000014p+0));
+    vec_bits root = (vec_bits)_mm512_permutex2var_epi64(_mm512_loadu_si512(table),
+                                                        _mm512_castpd_si512(shifted),
+                                                        _mm512_loadu_si512(table + 8));
+    return p * (vec)(root + ((vec_bits)shifted << 48));
 }
 
 #else // --- AVX2, SSE2 and other machines
@@ -158,17 +166,22 @@ static inline int vec_signs(vec x) { return signbit(x[0]) || signbit(x[1]); }
 #endif
 #endif
 
+static inline vec vec_scaled(vec x, vec scale)
+{
+    return vec_sqrt(x) * scale;
+}
+
+// Most sets are all of one sign, which the branch predictor learns.
+static inline vec vec_folded(vec sign, vec x, vec im, vec scale)
+{
+    vec root = vec_sqrt(x);
+    return (vec_signs(sign) ? vec_choose(sign, im / root, root) : root) * scale;
+}
+
 static inline void vec_root(vec x, vec *ret_root, vec *ret_inverse)
 {
     *ret_root = vec_sqrt(x);
     *ret_inverse = 1 / *ret_root;
-}
-
-// Most sets are all of one sign, which the branch predictor learns.
-static inline vec vec_fold(vec sign, vec x, vec im)
-{
-    vec root = vec_sqrt(x);
-    return vec_signs(sign) ? vec_choose(sign, im / root, root) : root;
 }
 
 // Minimax polynomial on |f| <= 1/2, relative error 3e-16. Adding 1.5 * 2^52 leaves the exponent in
