@@ -24,7 +24,7 @@ static struct batch_point point_at(const double x[FIT_PARAMS])
     return p;
 }
 
-// --- sums -----------------------------------------------------------------------------------------
+// --- sums ----------------------------------------------------------------------------------------
 size_t kernel_part(const struct fit_set *set)
 {
     size_t blocks = (set->distinct.padded + KERNEL_BLOCK - 1) / KERNEL_BLOCK;
@@ -91,7 +91,7 @@ bool kernel_gram(const struct fit_set *set, const double x[FIT_PARAMS], struct f
     return in_parts(set, x, kernel_gram_of, control, ret_gram);
 }
 
-// --- single readings ------------------------------------------------------------------------------
+// --- single readings -----------------------------------------------------------------------------
 size_t kernel_jacobian(const struct fit_set *set, const double x[FIT_PARAMS], size_t at,
                        struct kernel_block *ret_block)
 {

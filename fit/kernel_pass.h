@@ -23,7 +23,7 @@ BATCH_INLINE void load_channel(const struct set_rows *s, size_t i, vec w[SET_CHA
         w[c] = vec_load(s->channel[c] + i);
 }
 
-// --- inner products -------------------------------------------------------------------------------
+// --- inner products ------------------------------------------------------------------------------
 // Everything stays in registers: with the sums as a pass of its own over a stored a, this took a
 // quarter longer. a is short of the factor `lead`, the same for all rows.
 enum kind { BRIGHT, FOLDING, POLARISED }; // F; F where Re is negative somewhere; a channel
@@ -69,7 +69,7 @@ static void moments(const struct set_rows *s, size_t from, size_t to,
         sum_moments(s, from, to, &p, ks, kd, BRIGHT, ret);
 }
 
-// --- columns --------------------------------------------------------------------------------------
+// --- columns -------------------------------------------------------------------------------------
 BATCH_INLINE void fill_columns(const struct set_rows *s, size_t at, size_t count,
                          const struct batch_point *p, double ks, double kd, bool polarised,
                          double (*column)[KERNEL_BLOCK])
@@ -109,7 +109,7 @@ static void columns(const struct set_rows *s, size_t at, size_t count,
         fill_columns(s, at, count, &p, ks, kd, false, column);
 }
 
-// --- all inner products ---------------------------------------------------------------------------
+// --- all inner products --------------------------------------------------------------------------
 BATCH_INLINE void add_row(const double (*column)[KERNEL_BLOCK], size_t count, int row,
                     vec total[KERNEL_COLUMNS])
 {

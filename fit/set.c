@@ -19,7 +19,7 @@ void set_free(struct fit_set *set)
     *set = (struct fit_set){.count = 0};
 }
 
-// --- checks ---------------------------------------------------------------------------------------
+// --- checks --------------------------------------------------------------------------------------
 static bool state_ok(const unsigned char *state, size_t i)
 {
     return !state || state[i] < BRDF_STATES;
@@ -71,7 +71,7 @@ static int survey_readings(const struct fit_data *d, const struct fit_options *o
     return 0;
 }
 
-// --- weights --------------------------------------------------------------------------------------
+// --- weights -------------------------------------------------------------------------------------
 // sqrt(g) of one reading, scaled: unit is the least u or |f| of the set.
 static double root_weight(const struct fit_data *d, const struct fit_options *o, size_t i,
                           double unit)
@@ -101,7 +101,7 @@ static double g_scale_of(const struct fit_options *o, double unit)
     return 1;
 }
 
-// --- compilation ----------------------------------------------------------------------------------
+// --- compilation ---------------------------------------------------------------------------------
 // A reading before its weight is multiplied in.
 static void compile_reading(const struct fit_data *d, const struct fit_options *o, size_t i,
                             double unit, struct set_rows *r)
@@ -194,7 +194,7 @@ int set_compile(const struct fit_data *d, const struct fit_options *o, struct fi
     return e;
 }
 
-// --- values ---------------------------------------------------------------------------------------
+// --- values --------------------------------------------------------------------------------------
 // sqrt(G) times the weighted mean of each row's readings.
 static int mean_values(struct fit_set *s, struct fit_control *control)
 {
@@ -254,7 +254,7 @@ int set_replica(const struct fit_set *set, struct fit_set *ret_set)
     return 0;
 }
 
-// --- samples --------------------------------------------------------------------------------------
+// --- samples -------------------------------------------------------------------------------------
 static int draw_rows(const struct set_rows *from, struct rng *rng, struct fit_control *control,
                      struct set_rows *to)
 {

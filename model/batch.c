@@ -9,7 +9,7 @@
 #define PI 3.14159265358979323846
 enum { ARRAYS = 4, ALIGNMENT = 64 };
 
-// --- levels ---------------------------------------------------------------------------------------
+// --- levels --------------------------------------------------------------------------------------
 enum batch_level batch_best_level(void)
 {
 #ifdef __x86_64__
@@ -43,7 +43,7 @@ static const struct batch_passes *passes(enum batch_level level)
     return &batch_passes_plain;
 }
 
-// --- geometry -------------------------------------------------------------------------------------
+// --- geometry ------------------------------------------------------------------------------------
 bool batch_new(size_t count, const double *theta_i_rad, const double *theta_r_rad,
                const double *dphi_rad, enum brdf_diffuse diffuse, struct batch *ret_batch)
 {
@@ -71,7 +71,7 @@ void batch_free(struct batch *b)
     *b = (struct batch){.count = 0};
 }
 
-// --- parameters -----------------------------------------------------------------------------------
+// --- parameters ----------------------------------------------------------------------------------
 struct batch_point batch_point(double n, double kappa, double sigma)
 {
     double k = sqrt(kappa), above = (n - 1) * (n + 1) - kappa, im2 = 4 * n * n * kappa;

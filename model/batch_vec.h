@@ -59,7 +59,7 @@ BATCH_INLINE vec mean_value(const struct batch_point *p, struct facet g, vec hei
     return height * zz / (ss * ss * tt);
 }
 
-// --- derivatives ----------------------------------------------------------------------------------
+// --- derivatives ---------------------------------------------------------------------------------
 // A quantity and its derivatives by n and kappa = k^2.
 struct slope {
     vec f, n, k;

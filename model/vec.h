@@ -56,7 +56,7 @@ static inline double vec_sum(vec v)
     return s[0];
 }
 
-// --- what differs ---------------------------------------------------------------------------------
+// --- what differs --------------------------------------------------------------------------------
 // vec_all     a number in every lane
 // vec_fma     a b + c, rounded once where the machine can
 // vec_max
@@ -67,6 +67,7 @@ static inline double vec_sum(vec v)
 // vec_root    sqrt(x) and its reciprocal, likewise
 // vec_exp2    2^y to 5e-15; y in [-1020, 1020]
 
+// clang-format off
 #if VEC_LANES == 8
 static inline vec vec_all(double x) { return _mm512_set1_pd(x); }
 static inline vec vec_fma(vec a, vec b, vec c) { return _mm512_fmadd_pd(a, b, c); }
@@ -114,10 +115,12 @@ static inline vec vec_exp2(vec y)
 {
 #define E(j, bits) (int64_t)(bits##ull - ((uint64_t)(j) << 48))
     const int64_t table[16] = {
-        E(0, 0x3ff0000000000000), E(1, 0x3ff0b5586cf9890f), E(2, 0x3ff172b83c7d517b), E(3, 0x3ff2387a6e756238),
-        E(4, 0x3ff306fe0a31b715), E(5, 0x3ff3dea64c123422), E(6, 0x3ff4bfdad5362a27), E(7, 0x3ff5ab07dd485429),
-        E(8, 0x3ff6a09e667f3bcd), E(9, 0x3ff7a11473eb0187), E(10, 0x3ff8ace5422aa0db), E(11, 0x3ff9c49182a3f090),
-        E(12, 0x3ffae89f995ad3ad), E(13, 0x3ffc199bdd85529c), E(14, 0x3ffd5818dcfba487), E(15, 0x3ffea4afa2a490da),
+        E(0, 0x3ff0000000000000), E(1, 0x3ff0b5586cf9890f), E(2, 0x3ff172b83c7d517b),
+        E(3, 0x3ff2387a6e756238), E(4, 0x3ff306fe0a31b715), E(5, 0x3ff3dea64c123422),
+        E(6, 0x3ff4bfdad5362a27), E(7, 0x3ff5ab07dd485429), E(8, 0x3ff6a09e667f3bcd),
+        E(9, 0x3ff7a11473eb0187), E(10, 0x3ff8ace5422aa0db), E(11, 0x3ff9c49182a3f090),
+        E(12, 0x3ffae89f995ad3ad), E(13, 0x3ffc199bdd85529c), E(14, 0x3ffd5818dcfba487),
+        E(15, 0x3ffea4afa2a490da)
     };
 #undef E
     const vec magic = vec_all(0x1.8p48);
