@@ -37,8 +37,8 @@ struct fit_data {
     const double *dphi_rad;    // phi_r - phi_i; pi = specular half plane
     const double *f_per_sr;
     const double *u_per_sr; // type A, uncorrelated, standard uncertainty, > 0; NULL when unknown
-    // enum brdf_state of the light and of the analyser (model/channel.h says what f is then), in any
-    // mixture: all channels are fitted jointly. NULL: unpolarised, no analyser.
+    // enum brdf_state of the light and of the analyser (model/channel.h says what f is then), in
+    // any mixture: all channels are fitted jointly. NULL: unpolarised, no analyser.
     const unsigned char *pol_in, *pol_out;
 };
 
@@ -127,7 +127,8 @@ enum fit_stop {
     FIT_E_FEW_POINTS = -1, // fewer points than parameters
     FIT_E_ALL_ZERO = -2,   // eq. 17 has no denominator
     FIT_E_DATA =
-        -3, // a NAN or infinite value, theta outside [0, pi/2), u <= 0, f = 0 when relative, no state
+        -3, // a NAN or infinite value, theta outside [0, pi/2), u <= 0, f = 0 when relative, a
+            // state that does not exist
     FIT_E_OPTIONS = -4, // empty or negative bounds, variance weighting without u, ...
     FIT_E_CANCELED = -5,
     FIT_E_MEMORY = -6

@@ -5,11 +5,11 @@
 // readings F is the channel's mixture of Fresnel terms (model/channel.h) and b half where there is
 // an analyser.
 //
-// The arithmetic is that of the batch kernels (model/batch.h, model/batch_vec.h: what is computed,
-// its accuracy and floors), compiled for the same levels; set->level says which one runs, and levels
-// agree to 1e-13 of the sums' scale. The sums are made where the values are, because on their own
-// they would cost a quarter of the time. The exponent stays at KERNEL_EXP2_LEAST: its square must
-// not underflow. Reported values come from model/brdf.h, not from here. Nothing allocates. Any
+// The arithmetic is that of the batch kernels (model/batch.h; what is computed: model/batch_vec.h),
+// compiled for the same levels; set->level says which one runs, and levels agree to 1e-13 of the
+// columns' lengths. Values of a are summed where they are made: stored and summed by a pass of
+// their own they cost a quarter more. The exponent stays at KERNEL_EXP2_LEAST, so that its square
+// does not underflow. Reported values come from model/brdf.h, not from here. Nothing allocates. Any
 // thread.
 #pragma once
 #include "fit/control.h"
@@ -28,9 +28,9 @@ struct kernel_gram {
 #define KERNEL_BLOCK 128
 
 // x: FIT_PARAMS coordinates of fit/space.h; ks and kd are those that r is taken at.
-// The sums over rows [from, to) of set->distinct, `from` a multiple of KERNEL_BLOCK, `to` another or
-// the padded length. kernel_moments_of leaves the derivatives' rows and columns undefined and costs
-// about a third. What repeated readings scatter about their means is in the sums from row 0.
+// The sums over rows [from, to) of set->distinct, `from` a multiple of KERNEL_BLOCK, `to` another
+// or the padded length. kernel_moments_of leaves the derivatives' rows and columns undefined and
+// costs about a third. What repeated readings scatter about their means is in the sums from row 0.
 typedef void kernel_sums(const struct fit_set *set, const double x[FIT_PARAMS], size_t from,
                          size_t to, struct kernel_gram *ret_gram);
 kernel_sums kernel_moments_of, kernel_gram_of;

@@ -53,12 +53,17 @@ BATCH_INLINE void sum_moments(const struct set_rows *s, size_t from, size_t to,
         br = vec_fma(b, r, br);
         rr = vec_fma(r, r, rr);
     }
-    *ret = (struct kernel_products){lead * lead * vec_sum(aa), lead * vec_sum(ab), lead * vec_sum(ar),
-                                vec_sum(bb), vec_sum(br), vec_sum(rr)};
+    *ret = (struct kernel_products){lead * lead * vec_sum(aa),
+                                    lead * vec_sum(ab),
+                                    lead * vec_sum(ar),
+                                    vec_sum(bb),
+                                    vec_sum(br),
+                                    vec_sum(rr)};
 }
 
 static void moments(const struct set_rows *s, size_t from, size_t to,
-                    const struct batch_point *point, double ks, double kd, struct kernel_products *ret)
+                    const struct batch_point *point, double ks, double kd,
+                    struct kernel_products *ret)
 {
     const struct batch_point p = *point;
     if (s->channel[0])
@@ -71,8 +76,8 @@ static void moments(const struct set_rows *s, size_t from, size_t to,
 
 // --- columns -------------------------------------------------------------------------------------
 BATCH_INLINE void fill_columns(const struct set_rows *s, size_t at, size_t count,
-                         const struct batch_point *p, double ks, double kd, bool polarised,
-                         double (*column)[KERNEL_BLOCK])
+                               const struct batch_point *p, double ks, double kd, bool polarised,
+                               double (*column)[KERNEL_BLOCK])
 {
     const struct levels x = {vec_all(ks), vec_all(kd)};
     const vec v = vec_all(p->v);
@@ -111,7 +116,7 @@ static void columns(const struct set_rows *s, size_t at, size_t count,
 
 // --- all inner products --------------------------------------------------------------------------
 BATCH_INLINE void add_row(const double (*column)[KERNEL_BLOCK], size_t count, int row,
-                    vec total[KERNEL_COLUMNS])
+                          vec total[KERNEL_COLUMNS])
 {
     vec sum[KERNEL_COLUMNS];
     memcpy(sum, total, sizeof sum);

@@ -8,7 +8,8 @@
 
 #define REPEATS_MOST ((size_t)1 << 30) // readings
 
-// Numbers the distinct rows of `columns` arrays of `count` numbers from 0 on in order of appearance.
-// ret_group: `count` numbers. 0, FIT_E_CANCELED or FIT_E_MEMORY (also beyond REPEATS_MOST).
+// Numbers the distinct rows of `columns` arrays of `count` numbers from 0 on in order of
+// appearance. ret_group: `count` numbers. 0, FIT_E_CANCELED or FIT_E_MEMORY (also beyond
+// REPEATS_MOST).
 int repeats_find(const double *const column[], int columns, size_t count,
                  struct fit_control *control, uint32_t *ret_group, size_t *ret_groups);

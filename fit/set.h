@@ -20,7 +20,8 @@
 enum set_channel { SET_SS, SET_PP, SET_RE, SET_IM, SET_CHANNELS };
 
 // sqrt(g) is multiplied into spec, channel, diffuse, f and u: sums of squares of these are the sums
-// of eq. 17. g is scaled so that its largest value is 1, which changes no Delta and cannot overflow.
+// of eq. 17. g is scaled so that its largest value is 1, which changes no Delta and cannot
+// overflow.
 struct set_rows {
     size_t count;
     size_t padded;                 // length of the arrays

@@ -51,8 +51,8 @@ bool batch_new(size_t count, const double *theta_i_rad, const double *theta_r_ra
     double *memory = aligned_alloc(ALIGNMENT, padded * ARRAYS * sizeof *memory);
     if (!memory)
         return false;
-    struct batch b = {count, padded, memory, memory + padded, memory + 2 * padded,
-                      memory + 3 * padded};
+    struct batch b = {
+        count, padded, memory, memory + padded, memory + 2 * padded, memory + 3 * padded};
     for (size_t i = 0; i < padded; i++) {
         size_t j = i < count ? i : count - 1; // padding is the last direction again
         struct brdf_geometry g = brdf_geometry(theta_i_rad[j], theta_r_rad[j], dphi_rad[j]);

@@ -3,14 +3,15 @@
 // is computed once, as structure of arrays, and the rest in real arithmetic, a vector at a time
 // (physics: F of model/brdf.h, arranged for one division and two square roots).
 //
-// The same source is compiled for several instruction sets (levels); all give the same values to
-// 1e-13, and to 1e-12 those of model/brdf.h, relative, for any n and k: also at k = 0, for n next to
-// 1, at total reflection (n < 1) and at grazing angles. Floors:
-// - exp(-tan^2 theta/(2 sigma^2)) stays at BATCH_EXP2_LEAST however far from the peak, which is
-//   1e-301 of it: nothing underflows, and arithmetic with denormal numbers costs nobody time;
-// - on the critical angle of n < 1 with k = 0 the slope of F by n and k^2 is infinite. It is that of
-//   |N^2 - sin^2 beta| >= BATCH_M_LEAST instead, and 1/k that of k >= BATCH_K_LEAST. Within 1e-8 of
-//   the critical angle (in sin^2) the values themselves are as good as the angles' own rounding.
+// The same source is compiled for several instruction sets (levels). All give the same values to
+// 1e-13, and to 1e-12 those of model/brdf.h, relative, for n >= 0.2 and any k: also at k = 0, for n
+// next to 1, at total reflection (n < 1) and at grazing angles (seen: 7e-15 and 4e-13). For smaller n
+// and within 1e-8 of the critical angle it is 1e-16/|N^2 - sin^2 beta|, what the angles' own rounding
+// makes of F. Floors:
+// - exp(-tan^2 theta/(2 sigma^2)) stays at 2^BATCH_EXP2_LEAST, 1e-301, however far from the peak:
+//   nothing underflows, and nobody pays for denormal numbers;
+// - on the critical angle of n < 1 with k = 0 the slope of F by n and k^2 is infinite. The Jacobian
+//   takes that of |N^2 - sin^2 beta| >= BATCH_M_LEAST, and 1/k of k >= BATCH_K_LEAST.
 //
 // A struct batch owns its memory and is read-only once made: any thread. Pure functions; nothing is
 // allocated but by batch_new.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One level's passes over a whole batch (model/batch.h), compiled with the flags of that level: only
-// on a processor that has it may they be called. Parameters are within the domain.
+// One level's passes over a whole batch (model/batch.h), compiled with the flags of that level:
+// only on a processor that has it may they be called. Parameters are within the domain.
 #pragma once
 #include "model/batch.h"
 

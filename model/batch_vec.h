@@ -6,8 +6,8 @@
 //   Z = m c^2 + s^4                T = |s^2 + q c|^2 = Z + y s^2
 //   |rs|^2 = W/S,   rp = rs (s^2 - q c)/(s^2 + q c),   W = |N^2 - 1|^2 whatever beta
 //
-// so that all four Fresnel terms are W/(S^2 T) times a polynomial Q (model/fresnel.h, where the same
-// is done for one facet):
+// so that all four Fresnel terms are W/(S^2 T) times a polynomial Q (model/fresnel.h, where the
+// same is done for one facet):
 //
 //   |rs|^2: T      |rp|^2: |s^2 - q c|^2      Re(rs rp*): s^4 - m c^2      Im(rs rp*): 2 s^2 c b
 //   F = (|rs|^2 + |rp|^2)/2: Z

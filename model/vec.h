@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// A vector of doubles as wide as the file that includes this is compiled for: 8 with AVX-512, 4 with
-// AVX2 and FMA, else 2. Only what the batch kernels need. Written out, not left to the compiler's
-// vectoriser, so that every compiler and every optimisation level makes the same thing of it; plain
-// arithmetic is the compilers' own vector extension. No state: any thread.
+// A vector of doubles as wide as the file that includes this is compiled for: 8 with AVX-512, 4
+// with AVX2 and FMA, else 2. Only what the batch kernels need. Written out, not left to the
+// compiler's vectoriser, so that every compiler and every optimisation level makes the same thing
+// of it; plain arithmetic is the compilers' own vector extension. No state: any thread.
 //
-// Which operation where was measured on Zen 4: its divider works beside the multipliers, so one
-// square root and one division a vector cost nothing while there is enough to multiply. What would
-// make the divider the bottleneck takes AVX-512's reciprocal square root estimate (14 bits) and one
-// step of third order. AVX2 has that estimate in float only; with its conversions it gains nothing.
+// Which operation where was measured (Zen 4): the divider works beside the multipliers, so one
+// square root and one division a vector come nearly free while there is enough to multiply. A
+// second root would make it the bottleneck and so takes AVX-512's estimate of the reciprocal root
+// (14 bits) and one step of third order: with it for both roots f_00 took 14 % longer, with the
+// divider for both 40 %. AVX2 has that estimate in float only; its conversions cost what it saves.
 #pragma once
 #include <math.h>
 #include <stddef.h>
@@ -109,8 +110,8 @@ static inline void vec_root(vec x, vec *ret_root, vec *ret_inverse)
 }
 
 // 2^y = 2^(j/16) 2^f, |f| <= 1/32; minimax polynomial of f, relative error 4.5e-15. Adding
-// 1.5 * 2^48 leaves y in sixteenths in the low bits. E takes j out of the place in the table's entry
-// where j, shifted along with the exponent, comes to lie.
+// 1.5 * 2^48 leaves y in sixteenths in the low bits. E takes j out of the place in the table's
+// entry where j, shifted along with the exponent, comes to lie.
 static inline vec vec_exp2(vec y)
 {
 #define E(j, bits) (int64_t)(bits##ull - ((uint64_t)(j) << 48))

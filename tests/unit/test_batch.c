@@ -136,7 +136,7 @@ static void jacobian_is_the_complex_step_at_every_level(void **state)
 {
     (void)state;
     static const struct brdf_params all[] = {
-        {1.5, 0.3, 0.2, 0.8, 0.1}, {1.3, 7.5, 0.1, 1, 0.05}, {0.7, 0.2, 0.4, 0.5, 0},
+        {1.5, 0.3, 0.2, 0.8, 0.1}, {1.3, 7.5, 0.1, 1, 0.05},         {0.7, 0.2, 0.4, 0.5, 0},
         {0.5, 1e-3, 0.3, 1, 0.1},  {5.345, 5.345, 0.12, 0.95, 0.09}, {1.0001, 1e-4, 0.15, 1, 0}};
     struct rng rng;
     double worst = 0, apart = 0;
@@ -153,14 +153,17 @@ static void jacobian_is_the_complex_step_at_every_level(void **state)
         for (int l = 0; l < levels(); l++)
             batch_jacobian(&b, (enum batch_level)l, p, column[l]);
         for (size_t i = 0; i < POINTS; i++) {
-            double c2 = b.cos_beta[i] * b.cos_beta[i], height = b.spec[i] * v * exp(-v * b.tan2_theta[i]);
+            double c2 = b.cos_beta[i] * b.cos_beta[i],
+                   height = b.spec[i] * v * exp(-v * b.tan2_theta[i]);
             double f = creal(fresnel(p->n, kappa, c2));
             double fn = cimag(fresnel(CMPLX(p->n, h), kappa, c2)) / h;
             double fk = cimag(fresnel(p->n, CMPLX(kappa, h), c2)) / h;
-            const double want[BATCH_COLUMNS] = {
-                p->ks * height * fn, p->ks * height * fk,
-                p->ks * height * f * (2 * v * b.tan2_theta[i] - 2), height * f, b.diffuse[i],
-                p->ks * height * f + p->kd * b.diffuse[i]};
+            const double want[BATCH_COLUMNS] = {p->ks * height * fn,
+                                                p->ks * height * fk,
+                                                p->ks * height * f * (2 * v * b.tan2_theta[i] - 2),
+                                                height * f,
+                                                b.diffuse[i],
+                                                p->ks * height * f + p->kd * b.diffuse[i]};
             if (v * b.tan2_theta[i] > 690)
                 continue;
             // What a derivative by n and kappa is the difference of.
@@ -168,8 +171,11 @@ static void jacobian_is_the_complex_step_at_every_level(void **state)
             double wn = 4 * p->n * (p->n * p->n + kappa - 1), wk = 2 * (p->n * p->n + kappa + 1);
             double size = p->ks * height * f;
             const double scale[BATCH_COLUMNS] = {fabs(want[0]) + size * fabs(wn / w),
-                                                 fabs(want[1]) + size * fabs(wk / w), size * (2 * v * b.tan2_theta[i] + 2),
-                                                 want[3], want[4], want[5]};
+                                                 fabs(want[1]) + size * fabs(wk / w),
+                                                 size * (2 * v * b.tan2_theta[i] + 2),
+                                                 want[3],
+                                                 want[4],
+                                                 want[5]};
             for (int c = 0; c < BATCH_COLUMNS; c++)
                 for (int l = 0; l < levels(); l++) {
                     worst = fmax(worst, fabs(column[l][c][i] - want[c]) / scale[c]);
@@ -194,9 +200,9 @@ static void floors_keep_everything_finite_and_normal(void **state)
     (void)state;
     const double ti[] = {0, 0.5, 1.5707963, 2 * asin(0.6), 0.1}, tr[] = {1.5, 0.5, 1.5707963, 0, 1};
     const double dphi[] = {0, PI, 0, 0, 1};
-    static const struct brdf_params all[] = {
-        {1.5, 0, 0.01, 1, 0}, {0.6, 0, 0.01, 1, 0}, {0.6, 0, 0.5, 1, 0}, {1, 0, 0.5, 1, 0.1},
-        {1e-6, 0, 0.5, 1, 0}, {1e6, 1e6, 0.5, 1, 0}};
+    static const struct brdf_params all[] = {{1.5, 0, 0.01, 1, 0}, {0.6, 0, 0.01, 1, 0},
+                                             {0.6, 0, 0.5, 1, 0},  {1, 0, 0.5, 1, 0.1},
+                                             {1e-6, 0, 0.5, 1, 0}, {1e6, 1e6, 0.5, 1, 0}};
     struct batch b;
     assert_true(batch_new(5, ti, tr, dphi, BRDF_DIFFUSE_PAPER, &b));
     double memory[BATCH_COLUMNS][BATCH_PAD], f[BATCH_PAD], *column[BATCH_COLUMNS];

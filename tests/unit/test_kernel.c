@@ -16,9 +16,9 @@
 #define PI 3.14159265358979323846
 enum { SEED = 2008 };
 
-static const struct brdf_params surfaces[] = {{1.5, 0.02, .15, .9, .05}, {1.3, 7.5, .05, 1, .01},
-                                              {.6, .01, .3, .7, .1},     {5.345, 5.345, .12, .95, .09},
-                                              {1.5, 0, .2, .8, .1},      {.6, 0, .3, .7, .1}};
+static const struct brdf_params surfaces[] = {
+    {1.5, 0.02, .15, .9, .05},     {1.3, 7.5, .05, 1, .01}, {.6, .01, .3, .7, .1},
+    {5.345, 5.345, .12, .95, .09}, {1.5, 0, .2, .8, .1},    {.6, 0, .3, .7, .1}};
 enum { SURFACES = sizeof surfaces / sizeof surfaces[0] };
 
 // Readings at `distinct` directions out of plane, each measured `times` times with values and
@@ -237,8 +237,8 @@ static void parts_add_up_to_the_whole_to_the_bit(void **state)
     assert_in_range(parts, 2, 8);
     space_of_params(&surfaces[0], x);
     for (size_t i = parts; i-- > 0;) // whoever comes last
-        kernel_gram_of(&set, x, i * length,
-                       i + 1 < parts ? (i + 1) * length : set.distinct.padded, &part[i]);
+        kernel_gram_of(&set, x, i * length, i + 1 < parts ? (i + 1) * length : set.distinct.padded,
+                       &part[i]);
     for (size_t i = 0; i < parts; i++)
         kernel_add(&sum, &part[i]);
     assert_memory_equal(&sum, &whole, sizeof sum);
@@ -295,8 +295,9 @@ static void polarised_residuals_are_those_of_the_channels(void **state)
                 struct brdf_channel w = brdf_channel(&g, m.in[i], m.out[i]);
                 struct brdf_fresnel r = brdf_fresnel(p->n, p->k, g.sin2_beta, g.cos2_beta);
                 double height = p->ks * v * g.spec_per_sr * exp(-v * g.tan2_theta);
-                double f = height * (w.w_ss * r.ss + w.w_pp * r.pp + w.w_re * r.re + w.w_im * r.im) +
-                           p->kd * w.w_kd * g.inv_cos_i;
+                double f =
+                    height * (w.w_ss * r.ss + w.w_pp * r.pp + w.w_re * r.re + w.w_im * r.im) +
+                    p->kd * w.w_kd * g.inv_cos_i;
                 double scale = fmax(m.r.f[i], height * r.ss), root_g = set.all.root_g[i];
                 sum += pow((m.r.f[i] - f) * root_g, 2);
                 assert_near(b.r[i - at] / root_g, m.r.f[i] - f, 1e-13 * scale);
@@ -373,13 +374,14 @@ static void polarised_derivatives_are_the_complex_step(void **state)
                                                  height * f * (2 * v * set.all.tan2_theta[i] - 2),
                                                  height * f / ks, set.all.diffuse[i]};
                 const double scale[FIT_PARAMS] = {spec * (1 + 1 / p->n), spec * (1 + 1 / kappa),
-                                                  spec * 2 * (v * set.all.tan2_theta[i] + 1), spec / ks, 1};
+                                                  spec * 2 * (v * set.all.tan2_theta[i] + 1),
+                                                  spec / ks, 1};
                 for (int c = 0; c < FIT_PARAMS; c++) {
                     double off = fabs(b.j[c][i % KERNEL_BLOCK] - want[c]) / scale[c];
                     worst = fmax(worst, off);
                     if (!(off <= 1e-12))
-                        fail_msg("column %d, surface %d, level %d, reading %zu: %.17g, not %.17g", c,
-                                 j, l, i, b.j[c][i % KERNEL_BLOCK], want[c]);
+                        fail_msg("column %d, surface %d, level %d, reading %zu: %.17g, not %.17g",
+                                 c, j, l, i, b.j[c][i % KERNEL_BLOCK], want[c]);
                 }
             }
         }
@@ -388,8 +390,8 @@ static void polarised_derivatives_are_the_complex_step(void **state)
     measured_free(&m);
 }
 
-// Im(rs rp*) goes as k = sqrt(kappa): at k = 0 its slope is that at BATCH_K_LEAST, finite, and leads
-// away from 0 when the data want it.
+// Im(rs rp*) goes as k = sqrt(kappa): at k = 0 its slope is that at BATCH_K_LEAST, finite, and
+// leads away from 0 when the data want it.
 static void slope_at_k_zero_is_finite_and_points_the_right_way(void **state)
 {
     (void)state;
@@ -407,7 +409,8 @@ static void slope_at_k_zero_is_finite_and_points_the_right_way(void **state)
     data.pol_in = in;
     data.pol_out = out;
     assert_int_equal(set_compile(&data, &o, &control, &set), 0);
-    double zero[] = {1.5, 0, log(0.2), 1, 0}, least[] = {1.5, pow(BATCH_K_LEAST, 2), log(0.2), 1, 0};
+    double zero[] = {1.5, 0, log(0.2), 1, 0},
+           least[] = {1.5, pow(BATCH_K_LEAST, 2), log(0.2), 1, 0};
     double more[] = {1.5, pow(0.01, 2), log(0.2), 1, 0};
     struct kernel_block a, b, c;
     kernel_jacobian(&set, zero, 0, &a);
