@@ -7,10 +7,8 @@
 //
 // The arithmetic is that of the batch kernels (model/batch.h; what is computed: model/batch_vec.h),
 // compiled for the same levels; set->level says which one runs, and levels agree to 1e-13 of the
-// columns' lengths. Values of a are summed where they are made: stored and summed by a pass of
-// their own they cost a quarter more. The exponent stays at KERNEL_EXP2_LEAST, so that its square
-// does not underflow. Reported values come from model/brdf.h, not from here. Nothing allocates. Any
-// thread.
+// columns' lengths. The exponent stays at KERNEL_EXP2_LEAST, so that its square does not underflow.
+// Reported values come from model/brdf.h, not from here. Nothing allocates. Any thread.
 #pragma once
 #include "fit/control.h"
 #include "fit/set.h"

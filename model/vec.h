@@ -7,8 +7,8 @@
 // Which operation where was measured (Zen 4): the divider works beside the multipliers, so one
 // square root and one division a vector come nearly free while there is enough to multiply. A
 // second root would make it the bottleneck and so takes AVX-512's estimate of the reciprocal root
-// (14 bits) and one step of third order: with it for both roots f_00 took 14 % longer, with the
-// divider for both 40 %. AVX2 has that estimate in float only; its conversions cost what it saves.
+// (14 bits) and one step of third order. f_00 took 14 % longer with two roots of either kind. AVX2
+// has that estimate in float only: 18 % longer.
 #pragma once
 #include <math.h>
 #include <stddef.h>
