@@ -2,6 +2,7 @@
 #
 #   make                 the three programs            make demo     a whole campaign on the simulated bench
 #   make check           unit and system tests         make layers   who may include whom
+#   make bench           what things cost, as a table and in build/bench.json
 #   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
 #
 # A variant is a compiler and its flags: release, clang, asan, debug. VARIANT=asan make check.
@@ -49,7 +50,7 @@ Q := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
 .DEFAULT_GOAL := all
-.PHONY: all check unit system demo deps deps-check layers install uninstall clean doc lint
+.PHONY: all bench check unit system demo deps deps-check layers install uninstall clean doc lint
 all: $(PROGRAMS:%=$(B)/%) $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
 
 # --- objects, one archive a layer, programs -------------------------------------------------------
@@ -81,10 +82,10 @@ $(B)/obj/%.o: %.c Makefile
 
 # Numeric kernels are worth the vectoriser; flags are per file because optimize() attributes disable it.
 # Nobody reads the floating-point exception flags, and without them a conditional becomes a maximum.
-$(B)/obj/model/%.o $(B)/obj/fit/%.o: CFLAGS += $(if $(filter asan debug,$(VARIANT)),,-O3 -fno-trapping-math)
+$(B)/obj/model/%.o $(B)/obj/fit/%.o $(B)/obj/bench/%.o: CFLAGS += $(if $(filter asan debug,$(VARIANT)),,-O3 -fno-trapping-math)
 
-# The batch kernels are compiled once for each instruction set and chosen at run time (model/batch.h); on machines
-# other than x86 these files are empty.
+# The batch kernels are compiled once for each instruction set and chosen at run time (model/batch.h);
+# on machines other than x86 these files are empty.
 X86 := $(filter x86_64-%,$(shell $(CC) -dumpmachine))
 $(B)/obj/%_avx2.o: CFLAGS += $(if $(X86),-mavx2 -mfma)
 $(B)/obj/%_avx512.o: CFLAGS += $(if $(X86),-mavx512f -mavx512dq -mavx2 -mfma)
@@ -122,6 +123,25 @@ check: deps-check
 
 layers:
 	$(Q)scripts/layers
+
+# --- bench ----------------------------------------------------------------------------------------
+# bench/NAME.c is a program when it names its layers ('// uses: fit model'); bench/NAME_*.c are its parts,
+# and what it shares with others follows '// with: naive'. It prints a JSON object a line (bench/report.h);
+# scripts/bench collects them.
+BENCHES := $(patsubst bench/%.c,%,$(shell grep -ls '^// uses:' bench/*.c))
+named = $(shell sed -n 's,^// $(2): *,,p' bench/$(1).c)
+parts = $(patsubst %.c,$(B)/obj/%.o,bench/$(1).c $(wildcard bench/$(1)_*.c) $(patsubst %,bench/%.c,$(call named,$(1),with)))
+define bench_rules
+OBJECTS += $(call parts,$(1))
+$(B)/bench/$(1): $(call parts,$(1)) $(patsubst %,$(B)/lib%.a,$(call named,$(1),uses))
+	$$(call say,LINK,$$@)
+	$(Q)mkdir -p $$(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $$@ $$^ $(call libs_of,$(call named,$(1),uses))
+endef
+$(foreach b,$(BENCHES),$(eval $(call bench_rules,$(b))))
+
+bench: $(BENCHES:%=$(B)/bench/%)
+	$(Q)scripts/bench build/bench.json $^
 
 # --- first contact --------------------------------------------------------------------------------
 deps:

@@ -1,0 +1,3 @@
+// SPDX-License-Identifier: MIT
+#define DIVIDER divider_plain
+#include "bench/eval_divider.h"
