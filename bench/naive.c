@@ -14,7 +14,7 @@ double naive_f00(double theta_i_rad, double theta_r_rad, double dphi_rad,
     double beta = acos(ci * cr + si * sr * cos(dphi_rad)) / 2;
     double theta = acos((ci + cr) / (2 * cos(beta)));
 
-    double complex eps = CMPLX(p->n, p->k) * CMPLX(p->n, p->k);
+    double complex index = p->n + (double complex)I * p->k, eps = index * index;
     double complex q = csqrt(eps - sin(beta) * sin(beta));
     double complex rs = (cos(beta) - q) / (cos(beta) + q);
     double complex rp = (eps * cos(beta) - q) / (eps * cos(beta) + q);
@@ -41,7 +41,7 @@ double naive_f00_trimmed(double theta_i_rad, double theta_r_rad, double dphi_rad
     double cos_beta = sqrt((1 + cos_2beta) / 2), sin2_beta = (1 - cos_2beta) / 2;
     double cos_theta = (ci + cr) / (2 * cos_beta), cos2_theta = cos_theta * cos_theta;
 
-    double complex eps = CMPLX(p->n, p->k) * CMPLX(p->n, p->k);
+    double complex index = p->n + (double complex)I * p->k, eps = index * index;
     double complex q = csqrt(eps - sin2_beta);
     double complex rs = (cos_beta - q) / (cos_beta + q);
     double complex rp = (eps * cos_beta - q) / (eps * cos_beta + q);

@@ -156,8 +156,8 @@ static void jacobian_is_the_complex_step_at_every_level(void **state)
             double c2 = b.cos_beta[i] * b.cos_beta[i],
                    height = b.spec[i] * v * exp(-v * b.tan2_theta[i]);
             double f = creal(fresnel(p->n, kappa, c2));
-            double fn = cimag(fresnel(CMPLX(p->n, h), kappa, c2)) / h;
-            double fk = cimag(fresnel(p->n, CMPLX(kappa, h), c2)) / h;
+            double fn = cimag(fresnel(p->n + (double complex)I * h, kappa, c2)) / h;
+            double fk = cimag(fresnel(p->n, kappa + (double complex)I * h, c2)) / h;
             const double want[BATCH_COLUMNS] = {p->ks * height * fn,
                                                 p->ks * height * fk,
                                                 p->ks * height * f * (2 * v * b.tan2_theta[i] - 2),

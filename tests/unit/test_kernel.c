@@ -367,8 +367,8 @@ static void polarised_derivatives_are_the_complex_step(void **state)
                     continue;
                 double height = p->ks * v * exp(-v * set.all.tan2_theta[i]);
                 double f = channel_step(&set, i, p->n, kappa, 0);
-                double fn = channel_step(&set, i, CMPLX(p->n, h), kappa, h);
-                double fk = channel_step(&set, i, p->n, CMPLX(kappa, h), h);
+                double fn = channel_step(&set, i, p->n + (double complex)I * h, kappa, h);
+                double fk = channel_step(&set, i, p->n, kappa + (double complex)I * h, h);
                 double spec = height * set.all.spec[i], ks = p->ks;
                 const double want[FIT_PARAMS] = {height * fn, height * fk,
                                                  height * f * (2 * v * set.all.tan2_theta[i] - 2),
