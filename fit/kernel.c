@@ -14,6 +14,7 @@ static const struct kernel_passes *passes(const struct fit_set *set)
     if (set->level == BATCH_AVX2)
         return &kernel_passes_avx2;
 #endif
+    (void)set;
     return &kernel_passes_plain;
 }
 

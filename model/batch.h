@@ -5,9 +5,9 @@
 //
 // The same source is compiled for several instruction sets (levels). All give the same values to
 // 1e-13, and to 1e-12 those of model/brdf.h, relative, for n >= 0.2 and any k: also at k = 0, for n
-// next to 1, at total reflection (n < 1) and at grazing angles (seen: 7e-15 and 4e-13). For smaller n
-// and within 1e-8 of the critical angle it is 1e-16/|N^2 - sin^2 beta|, what the angles' own rounding
-// makes of F. Floors:
+// next to 1, at total reflection (n < 1) and at grazing angles (seen: 7e-15 and 4e-13). For smaller
+// n, and within 1e-8 of the critical angle, it is 1e-16/|N^2 - sin^2 beta|: what the angles' own
+// rounding makes of F. Floors:
 // - exp(-tan^2 theta/(2 sigma^2)) stays at 2^BATCH_EXP2_LEAST, 1e-301, however far from the peak:
 //   nothing underflows, and nobody pays for denormal numbers;
 // - on the critical angle of n < 1 with k = 0 the slope of F by n and k^2 is infinite. The Jacobian
