@@ -32,7 +32,8 @@ static bool rows_equal(const double *const column[], int columns, size_t a, size
     return true;
 }
 
-// A table of first rows (numbered from 1; 0 is free) with open addressing, at most half full.
+// A table of first rows (numbered from 1; 0 is free) with open addressing, at most half full. While
+// it is new, every row may cost the system a page: the slices are short.
 int repeats_find(const double *const column[], int columns, size_t count,
                  struct fit_control *control, uint32_t *ret_group, size_t *ret_groups)
 {
@@ -43,7 +44,7 @@ int repeats_find(const double *const column[], int columns, size_t count,
     if (!table)
         return FIT_E_MEMORY;
     for (size_t i = 0; i < count; i++) {
-        if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control)) {
+        if (i % (CONTROL_SLICE / 32) == 0 && control_ask(control)) {
             free(table);
             return FIT_E_CANCELED;
         }
