@@ -93,11 +93,16 @@ struct batch_point batch_point(double n, double kappa, double sigma)
     };
 }
 
+static bool within(double x, double least, double most)
+{
+    return x >= least && x <= most; // NAN is not
+}
+
 static bool in_domain(const struct brdf_params *p)
 {
-    return p->n > 0 && p->n <= BRDF_INDEX_MAX && p->k >= 0 && p->k <= BRDF_INDEX_MAX &&
-           p->sigma > 0 && isfinite(p->sigma) && p->ks >= 0 && isfinite(p->ks) && p->kd >= 0 &&
-           isfinite(p->kd);
+    return p->n > 0 && within(p->n, 0, BRDF_INDEX_MAX) && within(p->k, 0, BRDF_INDEX_MAX) &&
+           within(p->sigma, BRDF_SIGMA_MIN, BRDF_SIGMA_MAX) &&
+           within(p->ks, 0, BRDF_STRENGTH_MAX) && within(p->kd, 0, BRDF_STRENGTH_MAX);
 }
 
 void batch_f00(const struct batch *b, enum batch_level level, const struct brdf_params *p,

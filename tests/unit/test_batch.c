@@ -250,6 +250,9 @@ static void outside_the_domain_everything_is_nan(void **state)
         p = (struct brdf_params){1.5, 0, (double)NAN, 1, 0.1};
         batch_f00(&b, (enum batch_level)l, &p, f);
         assert_true(isnan(f[0]));
+        p = (struct brdf_params){1.5, 0, 0.1, 2 * BRDF_STRENGTH_MAX, 0.1};
+        batch_f00(&b, (enum batch_level)l, &p, f);
+        assert_true(isnan(f[0]));
     }
     batch_free(&b);
 }
