@@ -45,8 +45,8 @@ static void breathing_sleep_until(struct clk *clk, int64_t t_ns, const struct ca
 
 void instrument_breathe(struct instrument *in)
 {
-    if (in->safety)
-        safety_tick(in->safety);
+    if (in->safety && safety_tick(in->safety))
+        instrument_emission_off(in, NULL);
     if (in->watcher)
         in->watcher(in->watcher_ctx);
 }
@@ -168,6 +168,7 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    safety_obey(in->safety, in->stop);
     return safety_begin(in->safety, p->identity, sizeof p->identity, err);
 }
 

@@ -148,6 +148,9 @@ int instrument_power(struct instrument *in, double power_w, struct gon_error *er
 int instrument_emission_on(struct instrument *in, struct gon_error *err);
 int instrument_emission_off(struct instrument *in, struct gon_error *err);
 void instrument_permit(struct instrument *in, bool running);
+// Once this stop is asked for, off goes out in the next slice of whatever is waited for, also in
+// the middle of another device's call. Borrowed until the next call; NULL: none.
+void instrument_obey(struct instrument *in, const struct cancel *stop);
 enum safety_light instrument_light_left(const struct instrument *in); // what may be said of it
 const struct safety *instrument_safety(const struct instrument *in);
 

@@ -188,6 +188,13 @@ void instrument_permit(struct instrument *in, bool running)
         safety_permit(in->safety, running);
 }
 
+void instrument_obey(struct instrument *in, const struct cancel *stop)
+{
+    in->stop = stop;
+    if (in->safety)
+        safety_obey(in->safety, stop);
+}
+
 // A laser that was never reached was never told anything either.
 enum safety_light instrument_light_left(const struct instrument *in)
 {

@@ -36,6 +36,7 @@ struct instrument {
     struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];
     struct safety *safety;
+    const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;
     struct detector *detector;
     int range;

@@ -10,6 +10,9 @@ struct safety {
     bool running;  // a run has permission
     bool emission; // on was sent, off was not read back since
     bool pending;  // off was sent and not read back
+    bool busy;     // in a call of the laser's: its waits tick too
+    bool obeyed;   // the stop was told once
+    const struct cancel *stop;
     int64_t tick_ns, worst_gap_ns;
 };
 
@@ -34,19 +37,28 @@ bool safety_free(struct safety *s)
     return dark;
 }
 
+// Around each call of the laser's: s->busy = true; return talked(s, call).
+static int talked(struct safety *s, int rc)
+{
+    s->busy = false;
+    return rc;
+}
+
 int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error *err)
 {
     char text[96];
     int rc = safety_off(s, err);
     if (rc < 0)
         return rc;
-    return s->laser->ops->identify(s->laser, ret_text ? ret_text : text,
-                                   ret_text ? size : sizeof text, err);
+    s->busy = true;
+    return talked(s, s->laser->ops->identify(s->laser, ret_text ? ret_text : text,
+                                             ret_text ? size : sizeof text, err));
 }
 
 int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_error *err)
 {
-    int rc = s->laser->ops->reopen(s->laser, err);
+    s->busy = true;
+    int rc = talked(s, s->laser->ops->reopen(s->laser, err));
     return rc < 0 ? rc : safety_begin(s, ret_text, size, err);
 }
 
@@ -57,7 +69,8 @@ void safety_permit(struct safety *s, bool running)
 
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err)
 {
-    return s->laser->ops->set_power(s->laser, power_w, err);
+    s->busy = true;
+    return talked(s, s->laser->ops->set_power(s->laser, power_w, err));
 }
 
 static int check_may_emit(struct safety *s, struct gon_error *err)
@@ -90,7 +103,8 @@ int safety_on(struct safety *s, struct gon_error *err)
     // From here until an off is read back the laser counts as emitting, whatever the answer is.
     s->emission = true;
     s->tick_ns = clk_now_ns(s->clk);
-    rc = s->laser->ops->on(s->laser, err);
+    s->busy = true;
+    rc = talked(s, s->laser->ops->on(s->laser, err));
     if (rc < 0)
         safety_off(s, NULL);
     return rc;
@@ -102,39 +116,51 @@ int safety_off(struct safety *s, struct gon_error *err)
     const int64_t until_ns = clk_now_ns(s->clk) + CLK_S(SAFETY_OFF_S);
     struct gon_error why = {0};
     int rc;
-    s->pending = true;
+    s->pending = s->busy = true;
     for (;;) {
         rc = s->laser->ops->off(s->laser, &why);
         if (rc >= 0) {
             s->emission = s->pending = false;
-            return 0;
+            return talked(s, 0);
         }
         if (rc == GON_E_GONE || clk_now_ns(s->clk) >= until_ns)
             break;
         clk_sleep(s->clk, CLK_MS(100), NULL);
     }
+    talked(s, rc);
     // Before the first ON there is only a link that fails; afterwards light may come out.
     if ((s->emission || rc == GON_E_DEVICE) && !strstr(why.text, "LASER MAY BE ON"))
         return gon_fail(err, rc, "%s (%s)", safety_light_text(SAFETY_LIGHT_MAYBE), why.text);
     return gon_fail(err, rc, "%s", why.text);
 }
 
-void safety_tick(struct safety *s)
+void safety_obey(struct safety *s, const struct cancel *stop)
+{
+    s->stop = stop;
+    s->obeyed = false;
+}
+
+bool safety_tick(struct safety *s)
 {
     const int64_t now_ns = clk_now_ns(s->clk);
     if (s->emission && now_ns - s->tick_ns > s->worst_gap_ns)
         s->worst_gap_ns = now_ns - s->tick_ns;
     s->tick_ns = now_ns;
+    if (!s->emission || s->busy || s->obeyed || !cancel_requested(s->stop))
+        return false;
+    return s->obeyed = true;
 }
 
 int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_error *err)
 {
-    return s->laser->ops->status(s->laser, ret_status, err);
+    s->busy = true;
+    return talked(s, s->laser->ops->status(s->laser, ret_status, err));
 }
 
 int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err)
 {
-    return s->laser->ops->emission(s->laser, ret_emission, err);
+    s->busy = true;
+    return talked(s, s->laser->ops->emission(s->laser, ret_emission, err));
 }
 
 const char *safety_fault_text(const struct safety *s, int code)

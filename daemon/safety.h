@@ -8,10 +8,13 @@
 //  - off is sent until it was read back, at most for SAFETY_OFF_S; when that fails the answer is
 //    GON_E_DEVICE and "LASER MAY BE ON", and the rule "off" stays in force: every later tick of an
 //    idle instrument tries again (safety_pending);
+//  - a stop is obeyed whatever the thread waits for (safety_obey): the next tick tells that off is
+//    due, once for each stop; whoever ends the run repeats it until it is read back;
 //  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms.
 //  Today
 //    the longest gap is only measured; the guard process that holds the port will act on it.
 #pragma once
+#include "base/cancel.h"
 #include "base/clk.h"
 #include "base/err.h"
 #include "drivers/laser.h"
@@ -52,7 +55,11 @@ int safety_set_power(struct safety *s, double power_w, struct gon_error *err);
 int safety_on(struct safety *s, struct gon_error *err);
 int safety_off(struct safety *s, struct gon_error *err);
 
-void safety_tick(struct safety *s); // renews the lease; costs nothing while emission is off
+// The token of a stop, borrowed until the next call; NULL: none.
+void safety_obey(struct safety *s, const struct cancel *stop);
+// Renews the lease; costs nothing while emission is off. True when off is due: a stop was asked for
+// with the light on, and the laser is not being talked to.
+bool safety_tick(struct safety *s);
 
 int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_error *err);
 // One short question: whether the laser says that light comes out.

@@ -231,8 +231,6 @@ int travel_move(struct instrument *in, const struct travel_pose *target,
         rc = ride_all(in, t, cancel, err);
     if (rc >= 0)
         rc = where(in, target, ret_actual, err);
-    if (rc < 0)
-        travel_stop(in, NULL);
     return rc;
 }
 
@@ -286,8 +284,6 @@ int travel_home(struct instrument *in, const struct cancel *cancel, struct gon_e
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES && rc >= 0; part++)
         if (instrument_has(in, part))
             rc = home_one(in, part, cancel, err);
-    if (rc < 0)
-        travel_stop(in, NULL);
     return rc;
 }
 

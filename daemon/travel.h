@@ -7,7 +7,8 @@
 // that two re-seeks do not bring within the deadband is GON_E_DEVICE; GON_E_LINK and GON_E_GONE
 // come from the drivers. An axis with backlash is approached from below: from above it goes first
 // to the target less the backlash. A command whose answer was lost is not repeated before the
-// controller's own target and state were read. On every error all axes were told to stop.
+// controller's own target and state were read. After an error the axes may still move: the caller
+// stops them (travel_stop), and the light before them, as an axis that does not answer takes time.
 #pragma once
 #include "base/cancel.h"
 #include "base/err.h"

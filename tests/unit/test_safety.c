@@ -132,6 +132,32 @@ static void a_laser_that_is_gone_stays_pending_until_it_is_back_and_off(void **s
     safety_free(s);
 }
 
+static void a_stop_is_due_once_and_not_within_a_call(void **state)
+{
+    (void)state;
+    struct simbench b;
+    struct safety *s = begin(&b);
+    struct cancel *stop = cancel_new();
+    safety_permit(s, true);
+    assert_int_equal(safety_begin(s, NULL, 0, NULL), 0);
+    safety_obey(s, stop);
+    cancel_request(stop);
+    assert_false(safety_tick(s)); // no light: nothing is due
+    cancel_reset(stop);
+    assert_int_equal(safety_on(s, NULL), 0);
+    assert_false(safety_tick(s));
+    cancel_request(stop);
+    assert_true(safety_tick(s));
+    assert_false(safety_tick(s)); // repeating it is the caller's
+    safety_obey(s, stop);
+    assert_true(safety_tick(s));
+    assert_int_equal(safety_off(s, NULL), 0);
+    safety_obey(s, stop);
+    assert_false(safety_tick(s));
+    safety_free(s);
+    cancel_free(stop);
+}
+
 static void the_longest_silence_while_on_is_known(void **state)
 {
     (void)state;
@@ -160,6 +186,7 @@ int main(void)
         cmocka_unit_test(an_on_whose_answer_is_lost_is_followed_by_off_and_never_repeated),
         cmocka_unit_test(an_off_that_does_nothing_is_said_aloud_and_blocks_on),
         cmocka_unit_test(a_laser_that_is_gone_stays_pending_until_it_is_back_and_off),
+        cmocka_unit_test(a_stop_is_due_once_and_not_within_a_call),
         cmocka_unit_test(the_longest_silence_while_on_is_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
