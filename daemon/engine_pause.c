@@ -94,6 +94,7 @@ static void describe_loss(const struct engine *e, char *text, size_t size)
 void engine_enter_pause(struct engine *e, const char *text)
 {
     char whole[640];
+    (void)resume_asked(e); // only one that comes after this pause ends it
     const bool off = instrument_light_left(e->in) == SAFETY_LIGHT_OFF;
     snprintf(whole, sizeof whole, "%s%s%s", off ? "" : engine_light_text(e), off ? "" : "; ", text);
     engine_enter(e, RUN_PAUSED, whole);
@@ -103,6 +104,7 @@ static int wait_for_operator(struct engine *e)
 {
     int64_t tend_ns = 0;
     while (!resume_asked(e)) {
+        (void)engine_pause_asked(e); // it is paused already
         if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;
         if (clk_now_ns(e->ports->clk) >= tend_ns) {

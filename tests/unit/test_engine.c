@@ -385,6 +385,54 @@ static void an_operators_pause_is_dark_until_resumed(void **state)
     end(r);
 }
 
+static void resume_the_store(struct run *r)
+{
+    if (r->pauses_count == 1)
+        r->want_resume = true;
+}
+
+static void a_resume_from_before_does_not_end_a_pause(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->auto_resume = false;
+    r->store_fail_at = 4; // somebody says resume while the store fails, which does not take it
+    r->store_fails = 3;
+    r->on_pause = resume_the_store;
+    r->on_row = pause_at_seventh_row;
+    r->on_time = resume_an_hour_later;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 2);
+    assert_non_null(strstr(r->pauses[1], "by the operator"));
+    assert_true(r->b.clk.t_ns > CLK_S(3600));
+    end(r);
+}
+
+static void pause_twice(struct run *r)
+{
+    if (r->state == RUN_PAUSED && r->b.clk.t_ns < CLK_S(3000))
+        r->want_pause = true;
+    resume_an_hour_later(r);
+}
+
+// The first takes over the pause of a device that is away, the second finds it paused.
+static void a_pause_within_a_pause_is_the_operators_and_counts_once(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->auto_resume = false;
+    unplug_which = SIMBENCH_DETECTOR;
+    r->on_row = unplug_at_row_13;
+    r->on_time = pause_twice;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 2);
+    assert_non_null(strstr(r->pauses[1], "by the operator"));
+    assert_true(r->b.clk.t_ns > CLK_S(3600));
+    end(r);
+}
+
 static void open_interlock_at_seventh_row(struct run *r)
 {
     if (r->rows == 7)
@@ -640,6 +688,8 @@ int main(void)
         cmocka_unit_test(a_stop_at_any_time_is_dark_within_a_second_and_can_be_resumed),
         cmocka_unit_test(a_cancel_before_the_start_turns_nothing_on),
         cmocka_unit_test(an_operators_pause_is_dark_until_resumed),
+        cmocka_unit_test(a_resume_from_before_does_not_end_a_pause),
+        cmocka_unit_test(a_pause_within_a_pause_is_the_operators_and_counts_once),
         cmocka_unit_test(an_open_interlock_waits_for_somebody),
         cmocka_unit_test(light_that_fails_is_never_a_reading),
         cmocka_unit_test(light_that_fails_is_noticed_without_a_monitor),
