@@ -169,9 +169,29 @@ static int quick_check(struct store *s, struct gon_error *err)
     return rc;
 }
 
+// A WAL that was cut or removed takes with it what was acknowledged since the last checkpoint.
+static int count_readings(struct store *s, struct gon_error *err)
+{
+    int64_t rows = 0;
+    int rc = pragma(s, "SELECT count(*) FROM reading", &rows, err);
+    if (rc >= 0 && rows < s->rows)
+        return gon_fail(err, GON_E_STORE,
+                        "%s: %lld acknowledged readings are gone with its -wal file, which was cut "
+                        "or removed while it was written; stop the run and restore both from a "
+                        "copy",
+                        s->path, (long long)(s->rows - rows));
+    s->rows = rows;
+    return rc;
+}
+
+static void wal_path(const struct store *s, char *path, size_t size)
+{
+    snprintf(path, size, "%s-wal", s->path);
+}
+
 static int open_for_writing(struct store *s, struct gon_error *err)
 {
-    struct stat st;
+    char wal[sizeof s->path + 8];
     int rc = open_db(s, SQLITE_OPEN_READWRITE, err);
     if (rc >= 0)
         rc = identify(s, err);
@@ -181,15 +201,15 @@ static int open_for_writing(struct store *s, struct gon_error *err)
         rc = quick_check(s, err);
     if (rc >= 0)
         rc = store_db_run(s, "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL", err);
-    if (rc >= 0 && stat(s->path, &st) < 0)
-        rc = gon_fail(err, GON_E_STORE, "%s: %s", s->path, strerror(errno));
+    if (rc >= 0)
+        rc = count_readings(s, err);
     if (rc < 0) {
         close_db(s);
         return rc;
     }
-    s->device = st.st_dev;
-    s->inode = st.st_ino;
-    s->size = st.st_size;
+    wal_path(s, wal, sizeof wal);
+    store_watch_begin(&s->file, s->path);
+    store_watch_begin(&s->wal, wal);
     s->broken = false;
     return GON_OK;
 }
@@ -357,29 +377,41 @@ int store_create(const char *path, const struct store_new *what, struct store **
 
 // --- ready to write ------------------------------------------------------------------------------
 
-static int still_there(struct store *s, struct gon_error *err)
+static int check_file(struct store *s, struct gon_error *err)
 {
-    struct stat st;
-    bool same = stat(s->path, &st) == 0 && st.st_dev == s->device && st.st_ino == s->inode;
-    if (same && st.st_size < s->size)
+    const long long before = (long long)s->file.size;
+    switch (store_watch_look(&s->file, s->path)) {
+    case STORE_SEEN_SAME: return GON_OK;
+    case STORE_SEEN_CUT:
         return gon_fail(err, GON_E_STORE,
-                        "%s: was cut from %lld to %lld bytes while it was written; keep it and its "
+                        "%s: was cut while it was written (it had %lld bytes); keep it and its "
                         "-wal file, and restore it from a copy",
-                        s->path, (long long)s->size, (long long)st.st_size);
-    if (same) {
-        s->size = st.st_size;
-        return GON_OK;
+                        s->path, before);
+    case STORE_SEEN_OTHER: break;
     }
     return gon_fail(err, GON_E_STORE,
                     "%s: was moved, removed or replaced while it was written; put it back",
                     s->path);
 }
 
+// What is in a WAL that was removed still reaches the file through the descriptors that are open.
+static void check_wal(struct store *s)
+{
+    char wal[sizeof s->path + 8];
+    wal_path(s, wal, sizeof wal);
+    if (s->broken || store_watch_look(&s->wal, wal) == STORE_SEEN_SAME)
+        return;
+    sqlite3_exec(s->db, "PRAGMA wal_checkpoint(TRUNCATE)", NULL, NULL, NULL);
+    s->broken = true;
+}
+
 int store_db_ready(struct store *s, struct gon_error *err)
 {
     if (s->mode != STORE_WRITE)
         return gon_fail(err, GON_E_REFUSED, "%s: open for reading only", s->path);
-    int rc = still_there(s, err);
+    int rc = check_file(s, err);
+    if (rc >= 0)
+        check_wal(s);
     if (rc >= 0 && s->broken) {
         close_db(s);
         rc = open_for_writing(s, err);

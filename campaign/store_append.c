@@ -74,6 +74,8 @@ int store_append_reading(struct store *s, const struct store_reading *r, struct 
         rc = gon_fail(err, GON_E_INPUT, "%s: sweep %d, point %d is not in the plan", s->path,
                       r->sweep, r->point);
     sqlite3_finalize(q);
+    if (rc >= 0 && !there)
+        s->rows++;
     return there ? compare(s, r, err) : rc;
 }
 

@@ -3,9 +3,9 @@
 #pragma once
 #include "campaign/store.h"
 #include "campaign/store_lock.h"
+#include "campaign/store_watch.h"
 
 #include <sqlite3.h>
-#include <sys/types.h>
 
 enum {
     STORE_APPLICATION = 0x676f6e69, // "goni"
@@ -18,9 +18,8 @@ struct store {
     enum store_mode mode;
     struct store_lock lock;
     char path[512];
-    dev_t device; // of the file as it was opened
-    ino_t inode;
-    off_t size; // the largest that the file was; it never shrinks
+    struct store_watch file, wal; // as they were opened
+    int64_t rows;                 // readings that were acknowledged, or there when it was opened
     bool broken; // after an I/O error nothing that SQLite remembers can be trusted: reopen first
     int patience_ms;
 };

@@ -564,8 +564,75 @@ static void a_cut_file_is_noticed_at_the_next_reading(void **state)
     append(s, &a);
     assert_int_equal(truncate(path, 0), 0);
     assert_int_equal(store_append_reading(s, &b, &err), GON_E_STORE);
-    assert_non_null(strstr(err.text, "was cut from"));
+    assert_non_null(strstr(err.text, "was cut while it was written"));
     assert_int_equal(store_append_reading(s, &b, NULL), GON_E_STORE); // and it stays so
+    store_close(s, NULL);
+}
+
+static void wal_of(char *wal, size_t size)
+{
+    snprintf(wal, size, "%s-wal", path);
+}
+
+static void a_removed_wal_loses_nothing(void **state)
+{
+    (void)state;
+    char wal[160];
+    struct store_reading *rows;
+    struct store *s = created();
+    wal_of(wal, sizeof wal);
+    for (int point = 0; point < 6; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+        if (point == 2)
+            assert_int_equal(unlink(wal), 0);
+    }
+    pid_t child = fork(); // as a kill finds it: nobody closes it
+    if (child == 0) {
+        struct store *other = opened(STORE_READ);
+        _exit(store_read_readings(other, -1, &rows, NULL));
+    }
+    int status;
+    waitpid(child, &status, 0);
+    assert_int_equal(WEXITSTATUS(status), 6);
+    store_close(s, NULL);
+}
+
+// What it held is lost; that is said, and said again, until somebody restores it.
+static void a_cut_wal_is_noticed_at_the_next_reading(void **state)
+{
+    (void)state;
+    char wal[160];
+    struct gon_error err;
+    struct store *s = created();
+    wal_of(wal, sizeof wal);
+    for (int point = 0; point < 3; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+    }
+    assert_int_equal(truncate(wal, 0), 0);
+    const struct store_reading next = reading(1, 3, 1);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE);
+        assert_non_null(strstr(err.text, "3 acknowledged readings are gone with its -wal file"));
+    }
+    store_close(s, NULL);
+}
+
+// Somebody else's checkpoint cuts it too, and loses nothing.
+static void anothers_checkpoint_is_no_harm(void **state)
+{
+    (void)state;
+    struct store_reading *rows;
+    struct store *s = created();
+    for (int point = 0; point < 6; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+        if (point == 2)
+            tamper("PRAGMA wal_checkpoint(TRUNCATE)");
+    }
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 6);
+    free(rows);
     store_close(s, NULL);
 }
 
@@ -831,6 +898,9 @@ int main(void)
         TEST(other_files_and_newer_ones_are_refused),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
         TEST(a_cut_file_is_noticed_at_the_next_reading),
+        TEST(a_removed_wal_loses_nothing),
+        TEST(a_cut_wal_is_noticed_at_the_next_reading),
+        TEST(anothers_checkpoint_is_no_harm),
         TEST(anothers_write_lock_is_waited_for_then_named),
         TEST(a_full_disk_loses_nothing_that_was_acknowledged),
         TEST(killed_writers_lose_no_acknowledged_row),
