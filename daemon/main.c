@@ -15,6 +15,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 struct options {
@@ -44,6 +45,8 @@ static const struct option_row rows[] = {
      "this list for the manual page"},
     {NULL, OPTION_FLAG, 0, NULL, 0, 0, NULL},
 };
+
+enum { DESCRIPTORS_LEAST = 128, DESCRIPTORS_MOST = 1024 };
 
 #define END_S 4.5 // from the signal, whatever hangs
 #define ENDED_ALL_THE_SAME                                                                         \
@@ -190,6 +193,23 @@ static void block_signals(void)
     signal(SIGPIPE, SIG_IGN);
 }
 
+// Without a descriptor to accept with, nobody could stop a run. Not more than 1024, the most that
+// libmodbus can wait for.
+static int allow_descriptors(struct gon_error *err)
+{
+    struct rlimit r;
+    getrlimit(RLIMIT_NOFILE, &r);
+    if (r.rlim_cur < DESCRIPTORS_MOST) {
+        r.rlim_cur = r.rlim_max < DESCRIPTORS_MOST ? r.rlim_max : DESCRIPTORS_MOST;
+        setrlimit(RLIMIT_NOFILE, &r);
+    }
+    if (r.rlim_cur >= DESCRIPTORS_LEAST)
+        return GON_OK;
+    return gon_fail(err, GON_E_SYSTEM,
+                    "only %llu open files are allowed, %d are needed; see: ulimit -n",
+                    (unsigned long long)r.rlim_cur, DESCRIPTORS_LEAST);
+}
+
 static void say_line(void *ctx, const char *line)
 {
     (void)ctx;
@@ -268,7 +288,8 @@ static int open_hub(struct daemon *d, struct gon_error *err)
 static int run(struct daemon *d)
 {
     struct gon_error err;
-    int rc = open_socket(d, &err);
+    int rc = allow_descriptors(&err);
+    rc = rc < 0 ? rc : open_socket(d, &err);
     rc = rc < 0 ? rc : open_bench(d, &err);
     rc = rc < 0 ? rc : open_places(d, &err);
     if (rc == 0) {

@@ -294,3 +294,17 @@ def test_wrong_options_are_status_2(tmp_path, args, says):
     env = {**os.environ, "GONIO_SOCKET": str(tmp_path / "s"), "GONIO_DIR": str(tmp_path)}
     r = subprocess.run([BUILD / "goniod", *args], capture_output=True, text=True, timeout=PATIENCE_S, env=env, check=False)
     assert r.returncode == 2 and says in r.stderr, r
+
+
+def test_too_few_descriptors_are_refused_and_few_are_raised(tmp_path):
+    (tmp_path / "no.cfg").write_text("bench: { };")
+
+    def limited(soft, hard):
+        limits = f"ulimit -Sn {soft}; ulimit -Hn {hard}; exec \"$0\" --config no.cfg --socket s"
+        return subprocess.run(["sh", "-c", limits, BUILD / "goniod"], cwd=tmp_path, capture_output=True, text=True,
+                              timeout=PATIENCE_S)
+
+    few = limited(16, 64)
+    assert few.returncode == 1 and "only 64 open files are allowed, 128 are needed" in few.stderr, few
+    raised = limited(16, 256)
+    assert raised.returncode == 2 and "no.cfg:1" in raised.stderr, raised  # as far as its bench
