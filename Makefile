@@ -50,7 +50,7 @@ Q := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
 .DEFAULT_GOAL := all
-.PHONY: all bench check unit system demo deps deps-check layers install uninstall clean doc lint
+.PHONY: all bench check unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
 all: $(PROGRAMS:%=$(B)/%) $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
 
 # --- objects, one archive a layer, programs -------------------------------------------------------
@@ -140,14 +140,39 @@ $(B)/bench/$(1): $(call parts,$(1)) $(patsubst %,$(B)/lib%.a,$(call named,$(1),u
 endef
 $(foreach b,$(BENCHES),$(eval $(call bench_rules,$(b))))
 
-bench: $(BENCHES:%=$(B)/bench/%)
-	$(Q)scripts/bench build/bench.json $^
+# bench/peers/ is one program: gonio's fit beside other optimisers. One whose package is missing is
+# left out and reported as not measured. CMA-ES ends with a local search of NLopt.
+PEERS_NLOPT    := $(wildcard /usr/include/nlopt.h)
+PEERS_CMINPACK := $(wildcard /usr/include/cminpack-1/cminpack.h)
+PEERS_CMAES    := $(and $(PEERS_NLOPT),$(wildcard /usr/include/pagmo/pagmo.hpp))
+PEERS_OUT := $(foreach p,NLOPT CMINPACK CMAES,$(if $(PEERS_$(p)),,bench/peers/$(shell echo $(p) | tr A-Z a-z).c))
+PEERS_OBJ := $(patsubst %.c,$(B)/obj/%.o,$(filter-out $(PEERS_OUT),$(wildcard bench/peers/*.c)))
+PEERS_CXX := $(if $(PEERS_CMAES),$(B)/obj/bench/peers/pagmo.o)
+OBJECTS   += $(PEERS_OBJ) $(PEERS_CXX)
+$(PEERS_OBJ): CPPFLAGS += $(foreach p,NLOPT CMINPACK CMAES,$(if $(PEERS_$(p)),-DPEERS_$(p))) \
+    $(if $(PEERS_CMINPACK),-isystem $(dir $(PEERS_CMINPACK)))
+$(B)/obj/bench/peers/pagmo.o: bench/peers/pagmo.cpp Makefile
+	$(call say,CXX,$<)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CXX) $(CPPFLAGS) -isystem /usr/include/eigen3 -std=c++17 -Wall -Wextra -O2 -MMD -MP -c -o $@ $<
+$(B)/bench/peers: $(PEERS_OBJ) $(PEERS_CXX) $(B)/libfit.a $(B)/libmodel.a
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(if $(PEERS_CXX),$(CXX),$(CC)) $(LDFLAGS) -o $@ $^ $(if $(PEERS_NLOPT),-lnlopt) \
+	    $(if $(PEERS_CMINPACK),-lcminpack) $(if $(PEERS_CMAES),-lpagmo -ltbb) -lm
+
+BENCH_PROGRAMS := $(BENCHES:%=$(B)/bench/%) $(B)/bench/peers
+bench: deps-bench
+	$(Q)$(MAKE) --no-print-directory $(PARALLEL) $(BENCH_PROGRAMS)
+	$(Q)scripts/bench build/bench.json $(BENCH_PROGRAMS)
 
 # --- first contact --------------------------------------------------------------------------------
 deps:
 	$(Q)scripts/deps build
 deps-check:
 	$(Q)scripts/deps build check
+deps-bench:
+	$(Q)scripts/deps build bench
 demo: deps
 	$(Q)$(MAKE) --no-print-directory $(PARALLEL) all
 	$(Q)scripts/demo
