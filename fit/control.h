@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What every long computation of fit/ carries: has somebody asked to stop, and how much was
-// computed. One thread. After control_spend has returned true, results are worthless and callers
-// only unwind.
+// What every long computation of fit/ carries: has somebody asked to stop, how much was computed,
+// and who helps. One thread's own. After control_spend has returned true, results are worthless and
+// callers only unwind.
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
+
+struct pool; // fit/pool.h
 
 struct fit_control {
     bool (*canceled)(void *ctx); // NULL: never
@@ -12,6 +14,7 @@ struct fit_control {
     bool stop;
     size_t unchecked;  // points since canceled was last asked
     double points;     // evaluated in all
+    struct pool *pool; // NULL: this thread works alone
 };
 
 // About 0.3 ms of work at 10 ns a point and 1 ms with derivatives.

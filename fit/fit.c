@@ -4,6 +4,7 @@
 #include "fit/memetic.h"
 #include "fit/objective.h"
 #include "fit/paper_ga.h"
+#include "fit/pool.h"
 #include "fit/set.h"
 #include "fit/space.h"
 #include "fit/uncertainty.h"
@@ -111,8 +112,10 @@ int fit_run(const struct fit_data *data, const struct fit_options *options,
     struct fit_result r = {.evaluations = 0};
     struct fit_optimum optimum;
     int stop = check_options(options, data->u_per_sr != NULL);
-    if (!stop)
+    if (!stop) {
+        control.pool = pool_new(options->threads);
         stop = set_compile(data, options, &control, &set);
+    }
     if (!stop)
         stop = search(&set, options, &control, &optimum);
     if (stop)
@@ -126,6 +129,7 @@ int fit_run(const struct fit_data *data, const struct fit_options *options,
     *ret_result = r;
 out:
     set_free(&set);
+    pool_free(control.pool);
     return stop;
 }
 

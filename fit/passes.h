@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// Passes over the whole set: kernel_moments and kernel_gram with the parts shared over
+// control->pool and added in their order, so that the sums are the same to the bit as on one
+// thread. Within a task of the pool (a niche, an individual) they run on that task's thread.
+#pragma once
+#include "fit/control.h"
+#include "fit/kernel.h"
+
+// False when canceled.
+bool passes_moments(const struct fit_set *set, const double x[FIT_PARAMS],
+                    struct fit_control *control, struct kernel_gram *ret_gram);
+bool passes_gram(const struct fit_set *set, const double x[FIT_PARAMS],
+                 struct fit_control *control, struct kernel_gram *ret_gram);
