@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: MIT
-// The default search: a genetic algorithm over (n, sqrt k, log sigma), ks and kd solved for in
-// closed form at every evaluation, that keeps niches apart by deterministic crowding (Mahfoud 1995:
-// a child replaces the parent nearest to it); then the best of at least 8 distinct niches are
-// polished, the best few to convergence. Sets above MEMETIC_SAMPLE readings are searched on a
-// random sample of that size and the best polished on all readings. The fewer the points, the more
-// individuals and niches.
+// The default search: a population over (n, sqrt k, log sigma), spread as a Latin hypercube, with
+// ks and kd solved for in closed form at every individual; the best of each niche learn by
+// Levenberg-Marquardt (fit/polish.h), in rounds after which only the better half of distinct niches
+// lives on, and the last of them learn to the end. The fewer the readings, the more individuals and
+// niches. Sets above MEMETIC_SAMPLE readings are searched on a random sample of that size, and the
+// best niches polished on all readings.
 #pragma once
 #include "fit/control.h"
 #include "fit/polish.h"
 
 #define MEMETIC_SAMPLE ((size_t)4096)
 
-// 0, FIT_E_CANCELED or FIT_E_MEMORY. trace gets the best and mean Delta of each generation and,
-// last, that of the polished optimum twice.
+// 0, FIT_E_CANCELED or FIT_E_MEMORY. trace gets, as generation 0, the best and mean Delta of the
+// population; as generation 1 those of the niches, the best of them polished; then those of the
+// niches of each round; and last Delta of the result, twice. The best falls steadily, but for the
+// step from a sample to all readings. Individuals, niches and the passes over all readings are
+// shared over control->pool: same result to the bit.
 int memetic_search(const struct fit_set *set, const struct fit_space *space,
                    const struct fit_options *options, struct fit_control *control,
                    struct fit_optimum *ret_optimum);
