@@ -143,6 +143,33 @@ bool pool_run(struct fit_control *control, int count, pool_task *task, void *ctx
     return !control->stop;
 }
 
+struct ranges {
+    size_t count, length;
+    pool_range *task;
+    void *ctx;
+};
+
+static bool run_range(void *ctx, int index, struct fit_control *control)
+{
+    struct ranges *r = ctx;
+    size_t from = (size_t)index * r->length, left = r->count - from;
+    size_t to = from + (left < r->length ? left : r->length);
+    return !control_ask(control) && r->task(r->ctx, index, from, to, control);
+}
+
+size_t pool_range_length(size_t count, size_t least)
+{
+    size_t length = (count + POOL_PARTS - 1) / POOL_PARTS;
+    return length > least ? length : least;
+}
+
+bool pool_ranges(struct fit_control *control, size_t count, size_t least, pool_range *task,
+                 void *ctx)
+{
+    struct ranges r = {count, pool_range_length(count, least), task, ctx};
+    return pool_run(control, (int)((count + r.length - 1) / r.length), run_range, &r);
+}
+
 struct pool *pool_new(int threads)
 {
     struct pool *p = threads > 1 ? calloc(1, sizeof *p) : NULL;

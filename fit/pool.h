@@ -24,3 +24,11 @@ typedef bool pool_task(void *ctx, int index, struct fit_control *control);
 // pool in their order. Tasks do not share their own work further (control->pool is NULL in them)
 // unless there is only one. False when canceled, by any of them.
 bool pool_run(struct fit_control *control, int count, pool_task *task, void *ctx);
+
+// The same for a long array: [0, count) in at most POOL_PARTS ranges of equal length, at least
+// `least`, which depend on count and least alone. A task asks control itself when its range is long.
+#define POOL_PARTS 64
+typedef bool pool_range(void *ctx, int part, size_t from, size_t to, struct fit_control *control);
+size_t pool_range_length(size_t count, size_t least);
+bool pool_ranges(struct fit_control *control, size_t count, size_t least, pool_range *task,
+                 void *ctx);

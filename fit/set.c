@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fit/set.h"
 
+#include "fit/pool.h"
 #include "fit/repeats.h"
 #include "fit/rng.h"
 #include "fit/set_rows.h"
@@ -11,6 +12,7 @@
 
 #define PI 3.14159265358979323846
 #define EDGE_RAD 1e-9 // the dense zone includes its edges whatever rounding did to them
+#define RANGE_LEAST 1024 // readings of a thread's turn
 
 void set_free(struct fit_set *set)
 {
@@ -39,36 +41,65 @@ static enum brdf_state state_at(const unsigned char *state, size_t i)
     return state ? (enum brdf_state)state[i] : BRDF_STATE_U;
 }
 
-// What the readings say of the set as a whole.
+// What readings say as a whole.
 struct survey {
     double unit; // the least u (variance weights) or |f| (relative weights), for scaling
-    bool polarised;
+    double largest;
+    bool polarised, bad;
 };
 
-static int survey_readings(const struct fit_data *d, const struct fit_options *o,
-                           struct fit_control *control, struct survey *ret_survey)
+struct compilation {
+    const struct fit_data *data;
+    const struct fit_options *options;
+    double unit;
+    struct fit_set *set;
+    struct survey part[POOL_PARTS];
+};
+
+static void survey_reading(const struct fit_data *d, const struct fit_options *o, size_t i,
+                           struct survey *s)
 {
-    if (d->count < FIT_PARAMS)
-        return FIT_E_FEW_POINTS;
+    s->bad = s->bad || !reading_ok(d, o, i);
+    s->largest = fmax(s->largest, fabs(d->f_per_sr[i]));
+    s->polarised = s->polarised || state_at(d->pol_in, i) != BRDF_STATE_U ||
+                   state_at(d->pol_out, i) != BRDF_STATE_U;
+    if (o->weighting == FIT_RELATIVE)
+        s->unit = fmin(s->unit, fabs(d->f_per_sr[i]));
+    else if (o->weighting == FIT_VARIANCE && d->u_per_sr)
+        s->unit = fmin(s->unit, d->u_per_sr[i]);
+}
+
+static bool survey_range(void *ctx, int part, size_t from, size_t to, struct fit_control *control)
+{
+    struct compilation *c = ctx;
     struct survey s = {.unit = (double)INFINITY};
-    double largest = 0;
-    for (size_t i = 0; i < d->count; i++) {
+    for (size_t i = from; i < to; i++) {
         if (i % CONTROL_SLICE == 0 && control_ask(control))
-            return FIT_E_CANCELED;
-        if (!reading_ok(d, o, i))
-            return FIT_E_DATA;
-        largest = fmax(largest, fabs(d->f_per_sr[i]));
-        s.polarised = s.polarised || state_at(d->pol_in, i) != BRDF_STATE_U ||
-                      state_at(d->pol_out, i) != BRDF_STATE_U;
-        if (o->weighting == FIT_RELATIVE)
-            s.unit = fmin(s.unit, fabs(d->f_per_sr[i]));
-        else if (o->weighting == FIT_VARIANCE)
-            s.unit = fmin(s.unit, d->u_per_sr[i]);
+            return false;
+        survey_reading(c->data, c->options, i, &s);
     }
-    if (largest == 0)
-        return FIT_E_ALL_ZERO;
+    c->part[part] = s;
+    return true;
+}
+
+static int survey_readings(struct compilation *c, struct fit_control *control,
+                           struct survey *ret_survey)
+{
+    size_t count = c->data->count;
+    if (count < FIT_PARAMS)
+        return FIT_E_FEW_POINTS;
+    if (!pool_ranges(control, count, RANGE_LEAST, survey_range, c))
+        return FIT_E_CANCELED;
+    struct survey s = {.unit = (double)INFINITY};
+    size_t length = pool_range_length(count, RANGE_LEAST);
+    for (size_t i = 0; i * length < count; i++) {
+        s.unit = fmin(s.unit, c->part[i].unit);
+        s.largest = fmax(s.largest, c->part[i].largest);
+        s.polarised = s.polarised || c->part[i].polarised;
+        s.bad = s.bad || c->part[i].bad;
+    }
     *ret_survey = s;
-    return 0;
+    return s.bad ? FIT_E_DATA : s.largest == 0 ? FIT_E_ALL_ZERO : 0;
 }
 
 // --- weights -------------------------------------------------------------------------------------
@@ -123,18 +154,20 @@ static void compile_reading(const struct fit_data *d, const struct fit_options *
     r->channel[SET_IM][i] = g.spec_per_sr * c.w_im;
 }
 
-static int compile_readings(const struct fit_data *d, const struct fit_options *o, double unit,
-                            struct fit_control *control, struct fit_set *s)
+static bool compile_range(void *ctx, int part, size_t from, size_t to, struct fit_control *control)
 {
-    for (size_t i = 0; i < d->count; i++) {
+    const struct compilation *c = ctx;
+    struct fit_set *s = c->set;
+    (void)part;
+    for (size_t i = from; i < to; i++) {
         // Trigonometry: some 100 ns a reading, so the slice is shorter.
         if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control))
-            return FIT_E_CANCELED;
-        compile_reading(d, o, i, unit, &s->all);
+            return false;
+        compile_reading(c->data, c->options, i, c->unit, &s->all);
         if (s->u)
-            s->u[i] = d->u_per_sr[i] * s->all.root_g[i];
+            s->u[i] = c->data->u_per_sr[i] * s->all.root_g[i];
     }
-    return 0;
+    return true;
 }
 
 static int find_distinct(struct fit_control *control, struct fit_set *s)
@@ -155,10 +188,10 @@ static int find_distinct(struct fit_control *control, struct fit_set *s)
     return e ? e : set_rows_merge(&s->all, s->row, control, &s->distinct);
 }
 
-static int compile(const struct fit_data *d, const struct fit_options *o, double unit,
-                   struct fit_control *control, struct fit_set *s)
+static int compile(struct compilation *c, struct fit_control *control, struct fit_set *s)
 {
-    int e = compile_readings(d, o, unit, control, s);
+    c->set = s;
+    int e = pool_ranges(control, s->count, RANGE_LEAST, compile_range, c) ? 0 : FIT_E_CANCELED;
     if (e == 0)
         e = find_distinct(control, s);
     if (e == 0)
@@ -174,9 +207,11 @@ int set_compile(const struct fit_data *d, const struct fit_options *o, struct fi
                 struct fit_set *ret_set)
 {
     struct survey survey;
-    int e = survey_readings(d, o, control, &survey);
+    struct compilation c = {.data = d, .options = o};
+    int e = survey_readings(&c, control, &survey);
     if (e)
         return e;
+    c.unit = survey.unit;
     struct fit_set s = {.g_scale = g_scale_of(o, survey.unit), .level = batch_best_level()};
     e = set_rows_new(d->count, survey.polarised, &s.all, &s.memory[0]);
     s.count = s.all.count;
@@ -186,7 +221,7 @@ int set_compile(const struct fit_data *d, const struct fit_options *o, struct fi
         e = s.u ? 0 : FIT_E_MEMORY;
     }
     if (e == 0)
-        e = compile(d, o, survey.unit, control, &s);
+        e = compile(&c, control, &s);
     if (e)
         set_free(&s);
     else
@@ -255,17 +290,14 @@ int set_replica(const struct fit_set *set, struct fit_set *ret_set)
 }
 
 // --- samples -------------------------------------------------------------------------------------
-static int draw_rows(const struct set_rows *from, struct rng *rng, struct fit_control *control,
-                     struct set_rows *to)
+// One row of each of to->count strata of equal length: in order, none twice, and of every stretch of
+// the set alike.
+static void draw_rows(const struct set_rows *from, struct rng *rng, struct set_rows *to)
 {
-    size_t taken = 0;
-    for (size_t i = 0; taken < to->count; i++) { // selection sampling (Knuth 3.4.2 S)
-        if (i % CONTROL_SLICE == 0 && control_ask(control))
-            return FIT_E_CANCELED;
-        if (rng_below(rng, from->count - i) < to->count - taken)
-            set_rows_copy(from, i, to, taken++);
+    for (size_t i = 0; i < to->count; i++) {
+        size_t begin = i * from->count / to->count, end = (i + 1) * from->count / to->count;
+        set_rows_copy(from, begin + rng_below(rng, end - begin), to, i);
     }
-    return 0;
 }
 
 int set_sample(const struct fit_set *set, size_t count, uint64_t seed, struct fit_control *control,
@@ -280,12 +312,11 @@ int set_sample(const struct fit_set *set, size_t count, uint64_t seed, struct fi
     int e = set_rows_new(count, source->channel[0] != NULL, &s.all, &s.memory[0]);
     if (e)
         return e;
-    e = draw_rows(source, &rng, control, &s.all);
+    draw_rows(source, &rng, &s.all);
     s.count = s.all.count;
     s.padded = s.all.padded;
     s.distinct = s.all;
-    if (e == 0)
-        e = set_revalue(&s, control);
+    e = set_revalue(&s, control);
     if (e)
         set_free(&s);
     else

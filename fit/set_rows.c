@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "fit/set_rows.h"
 
+#include "fit/pool.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -85,15 +87,22 @@ int set_rows_merge(const struct set_rows *all, const uint32_t *row, struct fit_c
     return 0;
 }
 
-int set_rows_weigh(struct set_rows *rows, struct fit_control *control)
+static bool weigh_range(void *ctx, int part, size_t from, size_t to, struct fit_control *control)
 {
-    for (size_t i = 0; i < rows->count; i++) {
+    struct set_rows *rows = ctx;
+    (void)part;
+    for (size_t i = from; i < to; i++) {
         if (i % CONTROL_SLICE == 0 && control_ask(control))
-            return FIT_E_CANCELED;
+            return false;
         rows->spec[i] *= rows->root_g[i];
         rows->diffuse[i] *= rows->root_g[i];
         for (int c = 0; c < SET_CHANNELS && rows->channel[c]; c++)
             rows->channel[c][i] *= rows->root_g[i];
     }
-    return 0;
+    return true;
+}
+
+int set_rows_weigh(struct set_rows *rows, struct fit_control *control)
+{
+    return pool_ranges(control, rows->count, CONTROL_SLICE / 4, weigh_range, rows) ? 0 : FIT_E_CANCELED;
 }
