@@ -20,6 +20,7 @@ struct options {
     bool json;
     const char *column, *angles, *trace, *dir;
     struct fit_words words;
+    struct fit_paper_words paper;
     double theta_i_max_deg;
     long seed, threads;
 };
@@ -35,13 +36,26 @@ static const struct option_row rows[] = {
      "uniform, dense:G, relative or variance (variance when every value has u_f_r)"},
     {"--method", OPTION_TEXT, offsetof(struct options, words.method), "M", 0, 0,
      "memetic, or paper: its binary genetic algorithm (memetic)"},
+    {"--population", OPTION_INT, offsetof(struct options, paper.population), "N", 4, 10000,
+     "paper: individuals, an even number (100)"},
+    {"--bits", OPTION_INT, offsetof(struct options, paper.bits), "N", 4, 30,
+     "paper: of each of the five genes (20)"},
+    {"--generations", OPTION_INT, offsetof(struct options, paper.generations), "N", 1,
+     FIT_GENERATIONS_MOST, "paper: after the first (1000)"},
+    {"--mutation", OPTION_TEXT, offsetof(struct options, paper.mutation), "M", 0, 0,
+     "paper: bit: each with probability 0.05, or individual: one bit of it (bit)"},
+    {"--scaling", OPTION_TEXT, offsetof(struct options, paper.scaling), "S", 0, 0,
+     "paper: of the fitness 1/Delta: none, or linear: the best is twice the mean (none)"},
+    {"--elitism", OPTION_FLAG, offsetof(struct options, paper.elitism), NULL, 0, 0,
+     "paper: the best individual lives on"},
     {"--diffuse", OPTION_TEXT, offsetof(struct options, words.diffuse), "D", 0, 0,
      "paper: kd/cos(theta_i), or lambert: kd/pi (paper)"},
     {"--bounds", OPTION_TEXT, offsetof(struct options, words.bounds), "LIST", 0, 0,
      "n=0.2:8,k=0:10,..."},
     {"--seed", OPTION_INT, offsetof(struct options, seed), "N", 0, 4294967295.0,
      "of the search (1)"},
-    {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64, "workers (1)"},
+    {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64,
+     "share the work; the result is the same (1)"},
     {"--trace", OPTION_TEXT, offsetof(struct options, trace), "FILE", 0, 0,
      "write each generation's Delta as CSV"},
     {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
@@ -140,6 +154,7 @@ static int load(const struct options *o, const char *file, struct dataset *ret_d
 static int set_options(const struct options *o, struct fit_options *options, struct gon_error *err)
 {
     int rc = fit_words_take(&o->words, options, err);
+    rc = rc < 0 ? rc : fit_paper_take(&o->paper, options, err);
     if (o->seed >= 0)
         options->seed = (uint64_t)o->seed;
     options->threads = o->threads > 0 ? (int)o->threads : 1;

@@ -140,6 +140,39 @@ int fit_words_take(const struct fit_words *words, struct fit_options *options,
     return GON_OK;
 }
 
+static bool paper_given(const struct fit_paper_words *w)
+{
+    return w->population || w->bits || w->generations || w->mutation || w->scaling || w->elitism;
+}
+
+int fit_paper_take(const struct fit_paper_words *w, struct fit_options *options,
+                   struct gon_error *err)
+{
+    static const char *const mutations[] = {"bit", "individual", NULL},
+                             *const scalings[] = {"none", "linear", NULL};
+    struct fit_paper_options p = options->paper;
+    int rc = GON_OK;
+    if (paper_given(w) && options->method != FIT_PAPER)
+        return gon_fail(err, GON_E_INPUT,
+                        "--population, --bits, --generations, --mutation, --scaling and --elitism "
+                        "belong to --method paper");
+    if (w->population % 2)
+        return gon_fail(err, GON_E_INPUT, "--population %ld: individuals breed in pairs; an even "
+                        "number of 4..10000", w->population);
+    p.population = w->population ? (int)w->population : p.population;
+    p.bits = w->bits ? (int)w->bits : p.bits;
+    p.generations = w->generations ? (int)w->generations : p.generations;
+    p.elitism = w->elitism || p.elitism;
+    if (w->mutation && (rc = choose("--mutation", w->mutation, mutations, err)) >= 0)
+        p.mutation = (enum fit_mutation)rc;
+    if (rc >= 0 && w->scaling && (rc = choose("--scaling", w->scaling, scalings, err)) >= 0)
+        p.scaling = (enum fit_scaling)rc;
+    if (rc < 0)
+        return rc;
+    options->paper = p;
+    return GON_OK;
+}
+
 int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_error *err)
 {
     char copy[1000];

@@ -13,8 +13,20 @@ struct fit_words { // NULL: not given
     const char *bounds;  // "n=0.2:8,kd=0:0.5"
 };
 
+// Of the paper's genetic algorithm; 0 and NULL: not given.
+struct fit_paper_words {
+    long population, bits, generations;
+    const char *mutation; // "bit", "individual"
+    const char *scaling;  // "none", "linear"
+    bool elitism;
+};
+
 // Changes what the words name in options and leaves the rest. GON_E_INPUT says which word is wrong.
 int fit_words_take(const struct fit_words *words, struct fit_options *options,
+                   struct gon_error *err);
+
+// The same for the paper's algorithm, which must be the method when one of them is given.
+int fit_paper_take(const struct fit_paper_words *words, struct fit_options *options,
                    struct gon_error *err);
 
 // "0,10,20.5" into degrees: the count.

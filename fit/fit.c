@@ -58,9 +58,13 @@ static bool bounds_ok(const struct brdf_params *l, const struct brdf_params *u)
 
 static bool paper_ok(const struct fit_paper_options *p)
 {
-    return p->population >= 4 && p->population <= 10000 && p->population % 2 == 0 && p->bits >= 4 &&
-           p->bits <= 30 && p->generations >= 0 && p->pc >= 0 && p->pc <= 1 && p->pm >= 0 &&
-           p->pm <= 1 && (p->scaling == 0 || p->scaling == 1);
+    bool sizes = p->population >= 4 && p->population <= 10000 && p->population % 2 == 0 &&
+                 p->bits >= 4 && p->bits <= 30 && p->generations >= 0 &&
+                 p->generations <= FIT_GENERATIONS_MOST;
+    bool rates = p->pc >= 0 && p->pc <= 1 && p->pm >= 0 && p->pm <= 1;
+    return sizes && rates &&
+           (p->mutation == FIT_MUTATE_BIT || p->mutation == FIT_MUTATE_INDIVIDUAL) &&
+           (p->scaling == FIT_SCALING_NONE || p->scaling == FIT_SCALING_LINEAR);
 }
 
 static bool weighting_ok(const struct fit_options *o, bool with_u)

@@ -3,7 +3,8 @@
 // uncertainties and with what the data cannot tell. This header is all that other layers need of
 // fit/.
 //
-// Units: radians and sr^-1. No I/O, no log, no threads of its own unless options say so. Arrays in
+// Units: radians and sr^-1. No I/O, no log; threads only within a call, when options ask for more
+// than one. The callbacks in options are called by the calling thread alone. Arrays in
 // fit_data are borrowed for the duration of the call. Same data, options and seed give the same
 // result, to the bit. Thread: any; calls share nothing.
 #pragma once
@@ -42,17 +43,30 @@ struct fit_data {
     const unsigned char *pol_in, *pol_out;
 };
 
-// The paper leaves these open; the defaults are ours (fit_options_default).
+enum fit_mutation {
+    FIT_MUTATE_BIT,       // each bit with probability pm
+    FIT_MUTATE_INDIVIDUAL // one bit, chosen at random, of each individual with probability pm
+};
+
+enum fit_scaling {
+    FIT_SCALING_NONE,  // fitness is 1/Delta
+    FIT_SCALING_LINEAR // and then a straight line of it: the mean stays, the best is twice the mean
+};
+
+// pc, pm and generations are the paper's; it leaves the others open, their defaults are ours
+// (fit_options_default).
 struct fit_paper_options {
     int population;  // 100; even, 4..10000
     int bits;        // per gene, 20; 4..30
-    int generations; // 1000
+    int generations; // 1000; 0..FIT_GENERATIONS_MOST
     double pc;       // crossover probability 0.5
-    double pm;       // mutation probability 0.05, per bit
-    bool elitism;    // false: the paper names none
-    int scaling;     // 0: fitness 1/Delta; 1: linear scaling, best = 2 x mean
+    double pm;       // mutation probability 0.05
+    enum fit_mutation mutation; // FIT_MUTATE_BIT
+    enum fit_scaling scaling;   // FIT_SCALING_NONE
+    bool elitism;               // false; true: the best individual lives on unchanged
 };
 
+#define FIT_GENERATIONS_MOST 1000000
 #define FIT_DENSE_MOST 1e12
 
 struct fit_options {
@@ -64,7 +78,7 @@ struct fit_options {
     // Bounds, inclusive, within fit_param_range; equal ones hold a parameter.
     struct brdf_params lower, upper;
     uint64_t seed;
-    int threads; // 1..64; one thread is used whatever it says: a fit of 850 readings is 6 ms
+    int threads; // 1..64, the calling one among them: same result to the bit, whatever it is
     double u_scale; // type B: relative standard uncertainty of a scale common to all readings
     struct fit_paper_options paper;
     bool (*canceled)(void *ctx); // NULL: never; asked every 1-2 ms of work at any size

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "fit/paper_ga.h"
 
-#include "fit/kernel.h"
+#include "fit/passes.h"
+#include "fit/pool.h"
 #include "fit/rng.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+enum { BATCH = 10 }; // individuals of a thread's turn
 
 struct chromosome {
     uint32_t gene[FIT_PARAMS]; // `bits` each: n, k, sigma, ks, kd
@@ -32,16 +35,37 @@ static void decode(const struct ga *ga, const struct chromosome *c, double x[FIT
                                           value[FIT_KS], value[FIT_KD]}, x);
 }
 
-static bool evaluate(struct ga *ga, struct chromosome *c)
+static bool evaluate_batch(void *ctx, int index, struct fit_control *control)
 {
-    double x[FIT_PARAMS];
-    struct kernel_gram gram;
-    decode(ga, c, x);
-    if (!kernel_moments(ga->set, x, ga->control, &gram))
+    struct ga *ga = ctx;
+    for (int i = BATCH * index; i < BATCH * (index + 1) && i < ga->o->population; i++) {
+        double x[FIT_PARAMS];
+        struct kernel_gram gram;
+        decode(ga, &ga->now[i], x);
+        if (!passes_moments(ga->set, x, control, &gram))
+            return false;
+        ga->now[i].delta = gram.m[KERNEL_R][KERNEL_R] / ga->set->ff;
+    }
+    return true;
+}
+
+static const struct chromosome *fittest(const struct ga *ga)
+{
+    const struct chromosome *best = &ga->now[0];
+    for (int i = 1; i < ga->o->population; i++)
+        if (ga->now[i].delta < best->delta)
+            best = &ga->now[i];
+    return best;
+}
+
+// All individuals of `now`, in any order and on any thread.
+static bool evaluate(struct ga *ga)
+{
+    if (!pool_run(ga->control, (ga->o->population + BATCH - 1) / BATCH, evaluate_batch, ga))
         return false;
-    c->delta = gram.m[KERNEL_R][KERNEL_R] / ga->set->ff;
-    if (c->delta < ga->best.delta)
-        ga->best = *c;
+    const struct chromosome *best = fittest(ga);
+    if (best->delta < ga->best.delta)
+        ga->best = *best;
     return true;
 }
 
@@ -60,7 +84,7 @@ static void spin_up(struct ga *ga)
         best = fmax(best, fitness(&ga->now[i]));
     }
     double mean = sum / ga->o->population, slope = 1, offset = 0;
-    if (ga->o->scaling == 1 && best > mean) {
+    if (ga->o->scaling == FIT_SCALING_LINEAR && best > mean) {
         slope = mean / (best - mean);
         offset = mean * (1 - slope);
     }
@@ -97,20 +121,29 @@ static void cross(struct ga *ga, struct chromosome *a, struct chromosome *b)
     }
 }
 
+static void flip(struct chromosome *c, int gene, int bit)
+{
+    c->gene[gene] ^= 1u << bit;
+}
+
 static void mutate(struct ga *ga, struct chromosome *c)
 {
+    if (ga->o->mutation == FIT_MUTATE_INDIVIDUAL) {
+        if (rng_uniform(&ga->rng) < ga->o->pm) {
+            int gene = (int)rng_below(&ga->rng, FIT_PARAMS);
+            flip(c, gene, (int)rng_below(&ga->rng, (uint64_t)ga->o->bits));
+        }
+        return;
+    }
     for (int g = 0; g < FIT_PARAMS; g++)
         for (int bit = 0; bit < ga->o->bits; bit++)
             if (rng_uniform(&ga->rng) < ga->o->pm)
-                c->gene[g] ^= 1u << bit;
+                flip(c, g, bit);
 }
 
 static bool generation(struct ga *ga)
 {
-    struct chromosome elite = ga->now[0];
-    for (int i = 1; i < ga->o->population; i++)
-        if (ga->now[i].delta < elite.delta)
-            elite = ga->now[i];
+    struct chromosome elite = *fittest(ga);
     spin_up(ga);
     for (int i = 0; i < ga->o->population; i += 2) {
         struct chromosome *pair = &ga->next[i];
@@ -118,41 +151,33 @@ static bool generation(struct ga *ga)
         pair[1] = *spin(ga);
         if (rng_uniform(&ga->rng) < ga->o->pc)
             cross(ga, &pair[0], &pair[1]);
-        for (int j = 0; j < 2; j++) {
-            mutate(ga, &pair[j]);
-            if (i + j == 0 && ga->o->elitism)
-                pair[j] = elite;
-            if (!evaluate(ga, &pair[j]))
-                return false;
-        }
+        mutate(ga, &pair[0]);
+        mutate(ga, &pair[1]);
     }
+    if (ga->o->elitism)
+        ga->next[0] = elite;
     struct chromosome *swap = ga->now;
     ga->now = ga->next;
     ga->next = swap;
-    return true;
+    return evaluate(ga);
 }
 
 static bool populate(struct ga *ga)
 {
-    for (int i = 0; i < ga->o->population; i++) {
+    for (int i = 0; i < ga->o->population; i++)
         for (int g = 0; g < FIT_PARAMS; g++)
             ga->now[i].gene[g] = (uint32_t)(rng_next(&ga->rng) >> (64 - ga->o->bits));
-        if (!evaluate(ga, &ga->now[i]))
-            return false;
-    }
-    return true;
+    return evaluate(ga);
 }
 
 static void trace(const struct ga *ga, const struct fit_options *o, int number)
 {
     if (!o->trace)
         return;
-    double best = (double)INFINITY, sum = 0;
-    for (int i = 0; i < ga->o->population; i++) {
-        best = fmin(best, ga->now[i].delta);
+    double sum = 0;
+    for (int i = 0; i < ga->o->population; i++)
         sum += ga->now[i].delta;
-    }
-    o->trace(o->trace_ctx, number, best, sum / ga->o->population);
+    o->trace(o->trace_ctx, number, fittest(ga)->delta, sum / ga->o->population);
 }
 
 int paper_ga_search(const struct fit_set *set, const struct fit_space *space,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The paper's genetic algorithm (section 4): binary coding of the five parameters, proportional
-// (roulette) selection, one-point crossover with probability pc, mutation of each bit with
-// probability pm. What the paper leaves open is in struct fit_paper_options. Kept for comparison:
-// it does not reach the optimum.
+// (roulette) selection, one-point crossover with probability pc, mutation with probability pm. What
+// the paper leaves open is in struct fit_paper_options. Kept for comparison: it does not reach the
+// optimum. Individuals are shared over control->pool: same result to the bit.
 #pragma once
 #include "fit/control.h"
 #include "fit/polish.h"

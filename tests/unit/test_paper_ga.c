@@ -74,7 +74,7 @@ static void delta_is_worse_than_the_memetic_search_finds(void **state)
         for (uint64_t seed = 1; seed <= 3; seed++) {
             struct log log;
             o.seed = seed;
-            o.paper.scaling = scaling;
+            o.paper.scaling = (enum fit_scaling)scaling;
             struct fit_result paper = run(&r, &o, &log);
             double least = log.best[0];
             for (int i = 1; i <= GENERATIONS; i++)

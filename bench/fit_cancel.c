@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// uses: fit model
+// fit_cancel [TIMES SEED]: how long a fit goes on after it was told to stop, at random moments, for
+// 1e3 to 1e6 readings, both methods and 1, 2 and 4 threads. Latency from the flag's change to
+// fit_run's return, memory given back: by the wall clock, which on a busy machine holds what the
+// scheduler gave to others, and of the processor, all threads of the fit together. One JSON object a
+// line.
+#include "fit/fit.h"
+#include "tests/unit/samples.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+static double clock_ms(clockid_t id)
+{
+    struct timespec t;
+    clock_gettime(id, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+struct stop {
+    atomic_bool raised;
+    double after_ms;
+    double wall_ms, cpu_ms; // when it was raised
+};
+
+static bool canceled(void *ctx)
+{
+    struct stop *s = ctx;
+    return atomic_load(&s->raised);
+}
+
+static void *raise_later(void *ctx)
+{
+    struct stop *s = ctx;
+    struct timespec t = {(time_t)(s->after_ms / 1e3), (long)(fmod(s->after_ms, 1e3) * 1e6)};
+    nanosleep(&t, NULL);
+    s->wall_ms = clock_ms(CLOCK_MONOTONIC);
+    s->cpu_ms = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
+    atomic_store(&s->raised, true);
+    return NULL;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double p = *(const double *)a, q = *(const double *)b;
+    return (p > q) - (p < q);
+}
+
+enum { TIMES_MOST = 1000 };
+
+// False when the fit ended before it was told to stop.
+static bool stop_once(const struct fit_data *data, struct fit_options *o, double after_ms,
+                      double *ret_wall_ms, double *ret_cpu_ms)
+{
+    struct stop stop = {.after_ms = after_ms};
+    struct fit_result result;
+    pthread_t thread;
+    o->canceled = canceled;
+    o->cancel_ctx = &stop;
+    if (pthread_create(&thread, NULL, raise_later, &stop))
+        exit(1);
+    int rc = fit_run(data, o, &result);
+    double wall = clock_ms(CLOCK_MONOTONIC), cpu = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
+    pthread_join(thread, NULL);
+    *ret_wall_ms = wall - stop.wall_ms;
+    *ret_cpu_ms = cpu - stop.cpu_ms;
+    return rc == FIT_E_CANCELED;
+}
+
+static void study(const struct readings *r, enum fit_method method, int threads, int times,
+                  struct rng *rng)
+{
+    static double wall[TIMES_MOST], cpu[TIMES_MOST];
+    struct fit_data data = readings_data(r, true);
+    struct fit_options o = fit_options_default();
+    struct fit_result result;
+    o.method = method;
+    o.weighting = FIT_VARIANCE;
+    o.threads = threads;
+    o.paper.generations = r->count > 10000 ? 5 : 100;
+    double from = clock_ms(CLOCK_MONOTONIC);
+    if (fit_run(&data, &o, &result))
+        exit(1);
+    double whole = clock_ms(CLOCK_MONOTONIC) - from;
+    int count = 0;
+    for (int i = 0; i < times; i++)
+        count += stop_once(&data, &o, whole * rng_uniform(rng), &wall[count], &cpu[count]);
+    if (count == 0)
+        return;
+    qsort(wall, (size_t)count, sizeof *wall, by_value);
+    qsort(cpu, (size_t)count, sizeof *cpu, by_value);
+    printf("{\"name\": \"fit_cancel\", \"points\": %zu, \"method\": \"%s\", \"threads\": %d, "
+           "\"stopped\": %d, \"fit_ms\": %.1f, \"median_ms\": %.3f, \"p95_ms\": %.3f, \"most_ms\": "
+           "%.3f, \"median_cpu_ms\": %.3f, \"most_cpu_ms\": %.3f}\n", r->count,
+           method == FIT_PAPER ? "paper" : "memetic", threads, count, whole, wall[count / 2],
+           wall[(int)(0.95 * count)], wall[count - 1], cpu[count / 2], cpu[count - 1]);
+    fflush(stdout);
+}
+
+int main(int argc, char **argv)
+{
+    int times = argc > 1 ? atoi(argv[1]) : 40;
+    struct rng rng;
+    struct brdf_params truth = {1.6, 0.4, 0.17, 0.8, 0.06};
+    rng_seed(&rng, argc > 2 ? strtoull(argv[2], NULL, 10) : 1);
+    if (times < 1 || times > TIMES_MOST)
+        return 2;
+    for (size_t count = 1000; count <= 1000000; count *= 10) {
+        struct readings r = readings_new(count);
+        for (size_t i = 0; i < count; i++)
+            readings_add(&r, 6.0 * (double)(i % 10), samples_lin(&rng, -85, 85), 0);
+        readings_measure(&r, &truth, 0.02, 1e-5, 5);
+        for (int method = 0; method < 2; method++)
+            for (int threads = 1; threads <= 4; threads *= 2)
+                study(&r, method ? FIT_PAPER : FIT_MEMETIC, threads, times, &rng);
+        readings_free(&r);
+    }
+    return 0;
+}
