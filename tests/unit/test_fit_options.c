@@ -72,11 +72,41 @@ static void angles_are_a_list(void **state)
     assert_int_equal(fit_angles_take("-1", deg, 3, &err), GON_E_INPUT);
 }
 
+static void refuses_paper(struct fit_paper_words w, enum fit_method method, const char *text)
+{
+    struct gon_error err = {0};
+    struct fit_options o = fit_options_default();
+    o.method = method;
+    assert_int_equal(fit_paper_take(&w, &o, &err), GON_E_INPUT);
+    if (!strstr(err.text, text))
+        fail_msg("'%s' is not in '%s'", text, err.text);
+}
+
+static void words_of_the_papers_algorithm(void **state)
+{
+    (void)state;
+    struct fit_options o = fit_options_default(), before = o;
+    struct fit_paper_words none = {0}, all = {40, 16, 200, "individual", "linear", true};
+    assert_int_equal(fit_paper_take(&none, &o, NULL), 0);
+    assert_memory_equal(&o.paper, &before.paper, sizeof o.paper);
+    o.method = FIT_PAPER;
+    assert_int_equal(fit_paper_take(&all, &o, NULL), 0);
+    assert_true(o.paper.population == 40 && o.paper.bits == 16 && o.paper.generations == 200);
+    assert_int_equal(o.paper.mutation, FIT_MUTATE_INDIVIDUAL);
+    assert_int_equal(o.paper.scaling, FIT_SCALING_LINEAR);
+    assert_true(o.paper.elitism);
+    refuses_paper(all, FIT_MEMETIC, "belong to --method paper");
+    refuses_paper((struct fit_paper_words){.population = 7}, FIT_PAPER, "an even number");
+    refuses_paper((struct fit_paper_words){.mutation = "bits"}, FIT_PAPER, "did you mean 'bit'");
+    refuses_paper((struct fit_paper_words){.scaling = "sigma"}, FIT_PAPER, "none, linear");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(words_change_what_they_name),
         cmocka_unit_test(wrong_words_are_refused_by_name),
+        cmocka_unit_test(words_of_the_papers_algorithm),
         cmocka_unit_test(angles_are_a_list),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
