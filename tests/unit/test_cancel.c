@@ -13,7 +13,11 @@
 #include <time.h>
 #include <cmocka.h>
 
+#ifdef __SANITIZE_ADDRESS__
+#define LATENCY_MS 40.0 // the sanitizers slow everything down
+#else
 #define LATENCY_MS 10.0
+#endif
 
 static uint64_t seed = 20081;
 
