@@ -3,8 +3,8 @@
 // fit_cancel [TIMES SEED]: how long a fit goes on after it was told to stop, at random moments, for
 // 1e3 to 1e6 readings, both methods and 1, 2 and 4 threads. Latency from the flag's change to
 // fit_run's return, memory given back: by the wall clock, which on a busy machine holds what the
-// scheduler gave to others, and of the processor, all threads of the fit together. One JSON object a
-// line.
+// scheduler gave to others, and of the processor, all threads of the fit together. One JSON object
+// a line.
 #include "fit/fit.h"
 #include "tests/unit/samples.h"
 

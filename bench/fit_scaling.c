@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // uses: fit model
 // fit_scaling [ROUNDS]: search with polish at 1e3, 1e4, 1e5 and 1e6 readings (a dense plan, every
-// geometry different, noise 2 %), on one thread and on two, which must find the same to the bit. The
-// threads' rounds alternate and the least time of each counts, because other programs share the
+// geometry different, noise 2 %), on one thread and on two, which must find the same to the bit.
+// The threads' rounds alternate and the least time of each counts, because other programs share the
 // machine. cpu_ms is the processor's time of all threads together: how much work sharing adds. One
 // JSON object a line.
 #include "fit/fit.h"

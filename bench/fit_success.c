@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // uses: fit model
 // fit_success [TRUTHS SEEDS SEED]: how often the default search ends at the global optimum and how
-// long it takes, on one thread: 60 random samples (tests/unit/samples.h) measured 10 times each with
-// the paper's plan (850 readings, noise 2 % and 1e-5 sr^-1), fitted with uniform and with variance
-// weights.
+// long it takes, on one thread: 60 random samples (tests/unit/samples.h) measured 10 times each
+// with the paper's plan (850 readings, noise 2 % and 1e-5 sr^-1), fitted with uniform and with
+// variance weights.
 //
 // The optimum is the best known: of 200 polishes from random places, of one from the truth, and of
 // the searches themselves. A search has reached it with Delta within 1e-6 of it. Times are those of

@@ -49,12 +49,13 @@ struct search {
     struct fit_control *control;
     struct rng rng;
     int generation; // of the trace
+    double best;    // q in it so far: a niche evaluated again may differ by rounding
     int population, niches, steps;
     struct individual all[POPULATION_MAX];
     struct fit_optimum niche[NICHES_MAX];
 };
 
-// --- the population -------------------------------------------------------------------------------
+// --- the population ------------------------------------------------------------------------------
 static double between(double low, double high, double t)
 {
     return low + (high - low) * t;
@@ -101,7 +102,7 @@ static bool populate(struct search *s)
     return pool_run(s->control, (s->population + BATCH - 1) / BATCH, evaluate_batch, s);
 }
 
-// --- niches ---------------------------------------------------------------------------------------
+// --- niches --------------------------------------------------------------------------------------
 static double distance2(const struct individual *a, const struct individual *b)
 {
     double d = 0;
@@ -180,12 +181,14 @@ static int learn_round(struct search *s, int count, int steps, int keep)
     return kept;
 }
 
-// --- the search -----------------------------------------------------------------------------------
+// --- the search ----------------------------------------------------------------------------------
 static void trace(struct search *s, double best, double sum, int count)
 {
     const struct fit_options *o = s->options;
+    s->best = fmin(s->best, best);
     if (o->trace)
-        o->trace(o->trace_ctx, s->generation, best / s->set->ff, sum / count / s->set->ff);
+        o->trace(o->trace_ctx, s->generation, s->best / s->set->ff,
+                 fmax(s->best, sum / count) / s->set->ff);
     s->generation++;
 }
 
@@ -216,8 +219,8 @@ static void size_search(struct search *s)
 }
 
 // Leaves the niches that learnt to the end, best first. Returns their number, 0 when canceled. The
-// best individual learns to the end before the others begin: mostly it is the optimum, and the trace
-// tells it to whoever waits.
+// best individual learns to the end before the others begin: mostly it is the optimum, and the
+// trace tells it to whoever waits.
 static int search_set(struct search *s)
 {
     size_search(s);
@@ -235,7 +238,8 @@ static int search_set(struct search *s)
     return count > 0 ? learn_round(s, count, LAST_STEPS, count) : 0;
 }
 
-// From the optima on a sample to that on all readings; each pass over these is shared over the pool.
+// From the optima on a sample to that on all readings; each pass over these is shared over the
+// pool.
 static bool search_full(struct search *s, const struct fit_set *set, int count)
 {
     double most = FULL_WITHIN * s->niche[0].q;
@@ -243,6 +247,7 @@ static bool search_full(struct search *s, const struct fit_set *set, int count)
     while (kept < count && kept < FULL && s->niche[kept].q <= most)
         kept++;
     s->set = set;
+    s->best = (double)INFINITY;
     for (int i = 0; i < kept; i++)
         if (!polish(set, s->space, LAST_STEPS, s->control, &s->niche[i]))
             return false;
@@ -265,6 +270,7 @@ int memetic_search(const struct fit_set *set, const struct fit_space *space,
     s->space = space;
     s->options = options;
     s->control = control;
+    s->best = (double)INFINITY;
     rng_seed(&s->rng, options->seed);
     int count = search_set(s);
     stop = FIT_E_CANCELED;

@@ -151,10 +151,10 @@ static double predicted_gain(const struct state *st, const double d[N])
     return gain;
 }
 
-// --- the step's damping ---------------------------------------------------------------------------
+// --- the step's damping --------------------------------------------------------------------------
 // Far from the optimum the model is no parabola: a full step takes n to a bound, where F hardly
-// depends on k^2 and the way back is long. Measured over starts everywhere, the cap spares a quarter
-// of the passes and lets 67 % instead of 62 % of the starts reach the optimum.
+// depends on k^2 and the way back is long. Measured over starts everywhere, the cap spares a
+// quarter of the passes and lets 67 % instead of 62 % of the starts reach the optimum.
 static void cap_step(const struct state *st, double d[N])
 {
     double most = STEP_MOST * (1 + st->at.x[FIT_N]), step = fabs(d[FIT_N]);
@@ -181,7 +181,7 @@ static void damp_more(struct damping *damping)
     damping->growth *= GROWTH;
 }
 
-// --- the polish -----------------------------------------------------------------------------------
+// --- the polish ----------------------------------------------------------------------------------
 bool polish(const struct fit_set *set, const struct fit_space *space, int max_steps,
             struct fit_control *control, struct fit_optimum *optimum)
 {

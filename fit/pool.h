@@ -26,7 +26,7 @@ typedef bool pool_task(void *ctx, int index, struct fit_control *control);
 bool pool_run(struct fit_control *control, int count, pool_task *task, void *ctx);
 
 // The same for a long array: [0, count) in at most POOL_PARTS ranges of equal length, at least
-// `least`, which depend on count and least alone. A task asks control itself when its range is long.
+// `least`, which depend on count and least alone. A task asks control itself when a range is long.
 #define POOL_PARTS 64
 typedef bool pool_range(void *ctx, int part, size_t from, size_t to, struct fit_control *control);
 size_t pool_range_length(size_t count, size_t least);

@@ -290,8 +290,8 @@ int set_replica(const struct fit_set *set, struct fit_set *ret_set)
 }
 
 // --- samples -------------------------------------------------------------------------------------
-// One row of each of to->count strata of equal length: in order, none twice, and of every stretch of
-// the set alike.
+// One row of each of to->count strata of equal length: in order, none twice, and of every stretch
+// of the set alike.
 static void draw_rows(const struct set_rows *from, struct rng *rng, struct set_rows *to)
 {
     for (size_t i = 0; i < to->count; i++) {

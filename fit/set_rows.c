@@ -104,5 +104,6 @@ static bool weigh_range(void *ctx, int part, size_t from, size_t to, struct fit_
 
 int set_rows_weigh(struct set_rows *rows, struct fit_control *control)
 {
-    return pool_ranges(control, rows->count, CONTROL_SLICE / 4, weigh_range, rows) ? 0 : FIT_E_CANCELED;
+    bool done = pool_ranges(control, rows->count, CONTROL_SLICE / 4, weigh_range, rows);
+    return done ? 0 : FIT_E_CANCELED;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Samples to measure with the paper's plan: 850 readings, ten sweeps of 2.5 deg with 0.5 deg within 5
-// deg of specular. Truths cover the default bounds as far as surfaces go: dielectrics, metals, what
-// is between, and what is hard for a search.
+// Samples to measure with the paper's plan: 850 readings, ten sweeps of 2.5 deg with 0.5 deg within
+// 5 deg of specular. Truths cover the default bounds as far as surfaces go: dielectrics, metals,
+// what is between, and what is hard for a search.
 #pragma once
 #include "tests/unit/readings.h"
 

@@ -98,10 +98,11 @@ static void random_samples_agree_between_seeds(void **state)
     readings_free(&r);
 }
 
-// 32 samples of samples.h, hard ones among them, from seed 20082, with both weightings: a search ends
-// within 1e-6 of the best of 60 polishes from random places, one from the truth and itself in 63 of
-// the 64 fits at least. bench/fit_success measures 1200 such fits; where 99.9 % of them succeed, two
-// in 64 fail in one of 500 seeds: that is the rate of false alarms when the seed is changed.
+// 32 samples of samples.h, hard ones among them, from seed 20082, with both weightings: a search
+// ends within 1e-6 of the best of 60 polishes from random places, one from the truth and itself in
+// 63 of the 64 fits at least. bench/fit_success measures 1200 such fits; where 99.9 % of them
+// succeed, two in 64 fail in one of 500 seeds: that is the rate of false alarms when the seed is
+// changed.
 static double best_of_many(const struct fit_set *set, const struct fit_space *space,
                            const struct brdf_params *truth, struct rng *rng)
 {

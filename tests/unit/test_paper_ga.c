@@ -87,9 +87,10 @@ static void delta_is_worse_than_the_memetic_search_finds(void **state)
     readings_free(&r);
 }
 
-// Eight readings of the paper (section 4), with its 1000 generations. Over 20 seeds each, Delta ended
-// at 1.08 to 9.1 times the optimum with mutation of bits, at 1.8 to 12 with elitism, at 5.8 to 44 with
-// scaling, and at 16 to 262 with mutation of individuals, which lets the population become one.
+// Eight readings of the paper (section 4), with its 1000 generations. Over 20 seeds each, Delta
+// ended at 1.08 to 9.1 times the optimum with mutation of bits, at 1.8 to 12 with elitism, at 5.8
+// to 44 with scaling, and at 16 to 262 with mutation of individuals, which lets the population
+// become one.
 static void a_thousand_generations_do_not_reach_the_optimum(void **state)
 {
     (void)state;

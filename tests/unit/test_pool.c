@@ -135,7 +135,8 @@ static void passes_are_the_same_to_the_bit(void **state)
     for (size_t count = 5; count < 80000; count *= 9) {
         struct readings r = readings_new(count);
         for (size_t i = 0; i < count; i++)
-            readings_add(&r, 10.0 * (double)(i % 7), 170 * rng_uniform(&rng) - 85, rng_uniform(&rng));
+            readings_add(&r, 10.0 * (double)(i % 7), 170 * rng_uniform(&rng) - 85,
+                         rng_uniform(&rng));
         struct fit_data data = readings_data(&r, false);
         struct fit_options o = fit_options_default();
         struct fit_set set;
