@@ -11,9 +11,10 @@
 //       64              3            12, 10: 6, the end          all             99.9 %  86.3  0.93
 //      128              0            16, 10: 6, the end          all             99.9 %  96.0  0.90
 //      128              0            16, 4: 8, 6: 4, the end     all             99.9 %  94.7  0.76
-//    * 128              0            16, 4: 8, 6: 4, the end     half at first   99.8 %  92.7  0.59
+//      128              0            16, 4: 8, 6: 4, the end     half at first   99.8 %  92.7  0.59
 //       64              2            16, 4: 8, 6: 4, the end     half at first   99.8 %  86.8  0.65
 //      128              0            16, 4: 8, 6: 4, the end     1/4 at first    99.6 %  94.2  0.49
+//    * 128              0            16, 4: 8, 5: 3, the end     1/4 at first    99.5 %     -  0.44
 //       96              0            12, 5: 6, 6: 3, the end     half at first   99.3 %  91.5  0.46
 //       64              0            12, 5: 6, 6: 3, the end     all             99.7 %  89.3  0.55
 //       64              0            8, all to the end           all             99.2 %  80.3  0.48
@@ -37,12 +38,12 @@
 #include <string.h>
 
 enum { GENES = 3, POPULATION_MAX = 384, NICHES_MAX = 48, BATCH = 8, PILOTS = 16, FULL = 3 };
-enum { SCOUT_LEAST = 256, SCOUT_MOST = 1024 }; // readings
+enum { SCOUT_LEAST = 128, SCOUT_MOST = 1024 }; // readings
 #define LAST_STEPS 200   // of those that learn to the end: a bound, not an expectation
 #define SAME 1e-3        // of the bounds' distance: two niches have met
 #define FULL_WITHIN 1.2  // times the best Delta on a sample: may be the best on all readings
 
-enum { SCOUT_STEPS = 4, SEARCH_STEPS = 6 };
+enum { SCOUT_STEPS = 4, SEARCH_STEPS = 5 };
 
 struct individual {
     double gene[GENES]; // in [0, 1]
@@ -267,7 +268,7 @@ static int search_set(struct search *s)
         return 0;
     trace_niches(s, s->scouted, count);
     s->niche[count++] = pilot;
-    count = learn_round(s, s->set, count, SEARCH_STEPS, s->niches / 4);
+    count = learn_round(s, s->set, count, SEARCH_STEPS, s->niches * 3 / 16);
     if (count == 0)
         return 0;
     trace_niches(s, s->set, count);
@@ -304,8 +305,8 @@ static int draw(const struct fit_set *from, size_t count, const struct search *s
 
 static size_t scouts_of(size_t count)
 {
-    size_t half = count / 2;
-    return half < SCOUT_LEAST ? count : half < SCOUT_MOST ? half : SCOUT_MOST;
+    size_t quarter = count / 4;
+    return quarter < SCOUT_LEAST ? count : quarter < SCOUT_MOST ? quarter : SCOUT_MOST;
 }
 
 int memetic_search(const struct fit_set *set, const struct fit_space *space,

@@ -3,9 +3,9 @@
 // ks and kd solved for in closed form at every individual; the best of each niche learn by
 // Levenberg-Marquardt (fit/polish.h) in rounds, after which only the better half of distinct niches
 // lives on, and the last of them learn to the end. At least 8 distinct niches learn on all readings
-// searched; half of the readings are enough for the population and the first round. The fewer the
-// readings, the more individuals and niches. Sets above MEMETIC_SAMPLE readings are searched on a
-// random sample of that size, and the best niches polished on all readings.
+// searched; a quarter of the readings is enough for the population and the first round. The fewer
+// the readings, the more individuals and niches. Sets above MEMETIC_SAMPLE readings are searched on
+// a random sample of that size, and the best niches polished on all readings.
 #pragma once
 #include "fit/control.h"
 #include "fit/polish.h"
