@@ -5,6 +5,7 @@
 // fit_run's return, memory given back: by the wall clock, which on a busy machine holds what the
 // scheduler gave to others, and of the processor, all threads of the fit together. One JSON object
 // a line.
+#include "bench/report.h"
 #include "fit/fit.h"
 #include "tests/unit/samples.h"
 
@@ -93,17 +94,22 @@ static void study(const struct readings *r, enum fit_method method, int threads,
         return;
     qsort(wall, (size_t)count, sizeof *wall, by_value);
     qsort(cpu, (size_t)count, sizeof *cpu, by_value);
-    printf("{\"name\": \"fit_cancel\", \"points\": %zu, \"method\": \"%s\", \"threads\": %d, "
-           "\"stopped\": %d, \"fit_ms\": %.1f, \"median_ms\": %.3f, \"p95_ms\": %.3f, \"most_ms\": "
-           "%.3f, \"median_cpu_ms\": %.3f, \"most_cpu_ms\": %.3f}\n", r->count,
-           method == FIT_PAPER ? "paper" : "memetic", threads, count, whole, wall[count / 2],
-           wall[(int)(0.95 * count)], wall[count - 1], cpu[count / 2], cpu[count - 1]);
-    fflush(stdout);
+    const struct {
+        const char *what;
+        double ms;
+    } rows[] = {{"median", wall[count / 2]}, {"longest", wall[count - 1]},
+                {"longest of the processor", cpu[count - 1]}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[80];
+        snprintf(text, sizeof text, "%zu points, %s, %d threads, %s", r->count,
+                 method == FIT_PAPER ? "paper" : "memetic", threads, rows[i].what);
+        report_row("fit_cancel", text, rows[i].ms, "ms", 0, NULL);
+    }
 }
 
 int main(int argc, char **argv)
 {
-    int times = argc > 1 ? atoi(argv[1]) : 40;
+    int times = argc > 1 ? atoi(argv[1]) : 10;
     struct rng rng;
     struct brdf_params truth = {1.6, 0.4, 0.17, 0.8, 0.06};
     rng_seed(&rng, argc > 2 ? strtoull(argv[2], NULL, 10) : 1);

@@ -5,6 +5,7 @@
 // The threads' rounds alternate and the least time of each counts, because other programs share the
 // machine. cpu_ms is the processor's time of all threads together: how much work sharing adds. One
 // JSON object a line.
+#include "bench/report.h"
 #include "fit/fit.h"
 #include "tests/unit/samples.h"
 
@@ -59,6 +60,20 @@ static void run(const struct readings *r, int threads, struct timing *least)
     least->result = f;
 }
 
+static void report(size_t count, const struct timing t[2], double per_point, double growth,
+                   bool same)
+{
+    char text[80];
+    snprintf(text, sizeof text, "%zu points, search and polish", count);
+    report_row("fit_scaling", text, t[0].elapsed_ms, "ms", 0, NULL);
+    snprintf(text, sizeof text, "%zu points, a point", count);
+    report_row("fit_scaling", text, per_point, "ns", growth, "1000 points");
+    snprintf(text, sizeof text, "%zu points, two threads%s", count,
+             same ? "" : ": ANOTHER RESULT");
+    report_row("fit_scaling", text, t[1].elapsed_ms, "ms", t[0].elapsed_ms / t[1].elapsed_ms,
+               "one thread");
+}
+
 int main(int argc, char **argv)
 {
     int rounds = argc > 1 ? atoi(argv[1]) : 7;
@@ -76,14 +91,7 @@ int main(int argc, char **argv)
         bool same = !memcmp(&t[0].result.params, &t[1].result.params, sizeof truth);
         double per_point = 1e6 * t[0].elapsed_ms / (double)count;
         per_point_first = count == 1000 ? per_point : per_point_first;
-        printf("{\"name\": \"fit_scaling\", \"points\": %zu, \"elapsed_ms\": %.3f, "
-               "\"elapsed_total_ms\": %.3f, \"ns_per_point\": %.1f, \"growth_from_1e3\": %.3f, "
-               "\"two_threads_ms\": %.3f, \"speedup\": %.2f, \"cpu_ms\": %.2f, "
-               "\"two_threads_cpu_ms\": %.2f, \"same_bits\": %s}\n",
-               count, t[0].elapsed_ms, t[0].total_ms, per_point, per_point / per_point_first,
-               t[1].elapsed_ms, t[0].elapsed_ms / t[1].elapsed_ms, t[0].cpu_ms, t[1].cpu_ms,
-               same ? "true" : "false");
-        fflush(stdout);
+        report(count, t, per_point, per_point / per_point_first, same);
         readings_free(&r);
     }
     return 0;

@@ -8,7 +8,8 @@
 // The optimum is the best known: of 200 polishes from random places, of one from the truth, and of
 // the searches themselves. A search has reached it with Delta within 1e-6 of it. Times are those of
 // elapsed_ms, compilation of the set included: by the wall clock, and of the processor, which other
-// programs on the machine disturb less. One JSON object a line.
+// programs on the machine disturb less. Misses are told on stderr.
+#include "bench/report.h"
 #include "fit/memetic.h"
 #include "fit/set.h"
 #include "fit/space.h"
@@ -96,12 +97,18 @@ static void try(const struct readings *r, const struct brdf_params *truth, int s
     t->fits++;
     t->reached += reached;
     if (!reached)
-        printf("{\"name\": \"fit_success.miss\", \"weights\": \"%s\", \"sample\": %d, \"kind\": "
-               "\"%s\", \"seed\": %d, \"delta\": %.9g, \"best_known\": %.9g, \"truth\": [%.4g, "
-               "%.4g, %.4g, %.4g, %.4g]}\n", t->weights, sample, samples_kind(sample), seed + 1,
-               found.q / set.ff, best / set.ff, truth->n, truth->k, truth->sigma, truth->ks,
-               truth->kd);
+        fprintf(stderr, "missed: %s, sample %d (%s), seed %d: Delta %.9g, best known %.9g; truth "
+                "%.4g %.4g %.4g %.4g %.4g\n", t->weights, sample, samples_kind(sample), seed + 1,
+                found.q / set.ff, best / set.ff, truth->n, truth->k, truth->sigma, truth->ks,
+                truth->kd);
     set_free(&set);
+}
+
+static void row(const struct tally *t, const char *what, double value, const char *unit)
+{
+    char text[80];
+    snprintf(text, sizeof text, "%s weights, %s", t->weights, what);
+    report_row("fit_success", text, value, unit, 0, NULL);
 }
 
 static void report(struct tally *t)
@@ -109,11 +116,13 @@ static void report(struct tally *t)
     size_t n = (size_t)t->fits, p95 = (size_t)(0.95 * (double)n);
     qsort(t->wall_ms, n, sizeof *t->wall_ms, by_value);
     qsort(t->cpu_ms, n, sizeof *t->cpu_ms, by_value);
-    printf("{\"name\": \"fit_success\", \"weights\": \"%s\", \"fits\": %d, \"reached_percent\": "
-           "%.2f, \"median_ms\": %.3f, \"p95_ms\": %.3f, \"median_cpu_ms\": %.3f, \"p95_cpu_ms\": "
-           "%.3f, \"most_cpu_ms\": %.3f, \"evaluations\": %.0f}\n", t->weights, t->fits,
-           100.0 * t->reached / t->fits, t->wall_ms[n / 2], t->wall_ms[p95], t->cpu_ms[n / 2],
-           t->cpu_ms[p95], t->cpu_ms[n - 1], t->passes / t->fits);
+    row(t, "fits", t->fits, "");
+    row(t, "optimum reached", 100.0 * t->reached / t->fits, "%");
+    row(t, "median", t->wall_ms[n / 2], "ms");
+    row(t, "95 % within", t->wall_ms[p95], "ms");
+    row(t, "median of the processor", t->cpu_ms[n / 2], "ms");
+    row(t, "95 % within, of the processor", t->cpu_ms[p95], "ms");
+    row(t, "evaluations of the set", t->passes / t->fits, "");
 }
 
 int main(int argc, char **argv)
