@@ -10,12 +10,36 @@
 enum { N = FIT_PARAMS };
 #define LEVERAGE_MAX 0.99 // a reading that alone determines a parameter says nothing of its noise
 #define FLOOR 1e-14       // of the largest eigenvalue
+#define ROUNDING 2.2e-16  // a reading's, beside the others: there is no less noise than this
 
-static void add_outer(const struct kernel_block *b, size_t i, double weight, double m[N][N])
+static double dot(const double *restrict x, const double *restrict y, size_t count)
 {
+    double lane[SET_LANES] = {0};
+    for (size_t i = 0; i < count; i += SET_LANES)
+        for (int j = 0; j < SET_LANES; j++)
+            lane[j] += x[i + (size_t)j] * y[i + (size_t)j];
+    return ((lane[0] + lane[4]) + (lane[1] + lane[5])) +
+           ((lane[2] + lane[6]) + (lane[3] + lane[7]));
+}
+
+void covariance_noise(const struct fit_set *set, const struct covariance *cov,
+                      const struct kernel_block *b, size_t at, size_t count, double *restrict s)
+{
+    if (set->u) {
+        memcpy(s, set->u + at, count * sizeof *s);
+        return;
+    }
+    for (size_t i = 0; i < count; i++)
+        s[i] = 1;
     for (int p = 0; p < N; p++)
-        for (int q = p; q < N; q++)
-            m[p][q] += weight * b->j[p][i] * b->j[q][i];
+        for (int q = 0; q <= p; q++) {
+            const double *restrict jp = b->j[p], *restrict jq = b->j[q];
+            const double weight = cov->inverse[p][q] * (p == q ? 1 : 2);
+            for (size_t i = 0; i < count; i++)
+                s[i] -= weight * jp[i] * jq[i];
+        }
+    for (size_t i = 0; i < count; i++)
+        s[i] = b->r[i] / (s[i] > 1 - LEVERAGE_MAX ? s[i] : 1 - LEVERAGE_MAX);
 }
 
 static void mirror(double m[N][N])
@@ -25,47 +49,43 @@ static void mirror(double m[N][N])
             m[p][q] = m[q][p];
 }
 
-// H and M; the noise of a reading is u where known, else r/(1 - h) with the leverage h = J^T
-// inverse J (no leverage while inverse is NULL).
-static bool accumulate(const struct fit_set *set, const double x[N], const double (*inverse)[N],
-                       struct fit_control *control, double h[N][N], double m[N][N])
+static bool accumulate_h(const struct fit_set *set, const double x[N], struct fit_control *control,
+                         double h[N][N])
 {
     struct kernel_block b;
     memset(h, 0, N * sizeof *h);
+    for (size_t at = 0; at < set->padded; at += KERNEL_BLOCK) {
+        if (control_spend(control, 2 * KERNEL_BLOCK))
+            return false;
+        size_t count = kernel_jacobian(set, x, at, &b);
+        for (int p = 0; p < N; p++)
+            for (int q = p; q < N; q++)
+                h[p][q] += dot(b.j[p], b.j[q], count);
+    }
+    mirror(h);
+    return true;
+}
+
+static bool accumulate_m(const struct fit_set *set, const double x[N],
+                         const struct covariance *cov, struct fit_control *control, double m[N][N])
+{
+    struct kernel_block b;
+    double s[KERNEL_BLOCK];
     memset(m, 0, N * sizeof *m);
     for (size_t at = 0; at < set->padded; at += KERNEL_BLOCK) {
         if (control_spend(control, 2 * KERNEL_BLOCK))
             return false;
         size_t count = kernel_jacobian(set, x, at, &b);
-        for (size_t i = 0; i < count; i++) {
-            double noise = set->u ? set->u[at + i] : b.r[i], leverage = 0;
-            if (inverse && !set->u) {
-                for (int p = 0; p < N; p++)
-                    for (int q = 0; q < N; q++)
-                        leverage += b.j[p][i] * inverse[p][q] * b.j[q][i];
-                noise /= 1 - fmin(leverage, LEVERAGE_MAX);
-            }
-            add_outer(&b, i, 1, h);
-            add_outer(&b, i, noise * noise, m);
-        }
+        covariance_noise(set, cov, &b, at, count, s);
+        for (int p = 0; p < N; p++)
+            for (size_t i = 0; i < count; i++)
+                b.j[p][i] *= s[i];
+        for (int p = 0; p < N; p++)
+            for (int q = p; q < N; q++)
+                m[p][q] += dot(b.j[p], b.j[q], count);
     }
-    mirror(h);
     mirror(m);
     return true;
-}
-
-// The pseudo-observations: in H with the noise variance that the data have along this parameter, in
-// M with its square, so that alone they would give width^2/12.
-static void add_bounds(const struct fit_space *space, const double tau[N], double h[N][N],
-                       double m[N][N])
-{
-    for (int i = 0; i < N; i++) {
-        double width = space->upper[i] - space->lower[i], info = 12 / (width * width);
-        if (!(width > 0))
-            continue;
-        h[i][i] += tau[i] * info;
-        m[i][i] += tau[i] * tau[i] * info;
-    }
 }
 
 // Inverse of h over the parameters in use, through the eigenvalues of h scaled to a unit diagonal.
@@ -90,56 +110,70 @@ static void invert(const double h[N][N], const bool known[N], double ret[N][N])
                              fmax(value[e], FLOOR * largest);
 }
 
-static void sandwich(const double inverse[N][N], const double m[N][N], double ret[N][N])
+// outer inner outer, both symmetric.
+static void sandwich(const double outer[N][N], const double inner[N][N], double ret[N][N])
 {
     double left[N][N] = {{0}};
     memset(ret, 0, N * sizeof *ret);
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++)
             for (int k = 0; k < N; k++)
-                left[i][j] += inverse[i][k] * m[k][j];
+                left[i][j] += outer[i][k] * inner[k][j];
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++)
             for (int k = 0; k < N; k++)
-                ret[i][j] += left[i][k] * inverse[k][j];
+                ret[i][j] += left[i][k] * outer[k][j];
+}
+
+// (H M^-1 H + P^-1)^-1.
+static void combine(const double h[N][N], const double m[N][N], const struct fit_space *space,
+                    const bool known[N], double ret[N][N])
+{
+    double inverse[N][N], information[N][N];
+    invert(m, known, inverse);
+    sandwich(h, inverse, information);
+    for (int i = 0; i < N; i++) {
+        double half = (space->upper[i] - space->lower[i]) / 2;
+        for (int j = 0; j < i; j++)
+            information[i][j] = information[j][i];
+        if (!known[i])
+            information[i][i] += 1 / (half * half);
+    }
+    invert(information, known, ret);
 }
 
 static void say_nothing(struct covariance *cov)
 {
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++)
-            cov->c[i][j] = cov->inverse[i][j] = cov->known[i] || cov->known[j] ? 0 : (double)NAN;
+            cov->c[i][j] = cov->known[i] || cov->known[j] ? 0 : (double)NAN;
 }
 
 bool covariance_at(const struct fit_set *set, const struct fit_space *space, const double x[N],
                    struct fit_control *control, struct covariance *ret_cov)
 {
     struct covariance cov = {.dof = (double)set->count};
+    double h[N][N], m[N][N], pure[N][N];
     for (int i = 0; i < N; i++) {
         cov.known[i] = !(space->lower[i] < space->upper[i]);
         cov.dof -= !cov.known[i];
     }
-    double h[N][N], m[N][N], tau[N];
-    if (!accumulate(set, x, NULL, control, h, m))
+    if (!accumulate_h(set, x, control, h))
         return false;
-    if (!set->u && cov.dof < 1) {
-        say_nothing(&cov);
-        *ret_cov = cov;
-        return true;
-    }
-    for (int i = 0; i < N; i++)
-        tau[i] = h[i][i] > 0 ? m[i][i] / h[i][i] : 0;
-    if (!set->u) {
-        double plain[N][N];
-        invert(h, cov.known, plain);
-        if (!accumulate(set, x, plain, control, h, m))
-            return false;
-        for (int i = 0; i < N; i++)
-            tau[i] *= (double)set->count / cov.dof;
-    }
-    add_bounds(space, tau, h, m);
     invert(h, cov.known, cov.inverse);
-    sandwich(cov.inverse, m, cov.c);
+    if (!accumulate_m(set, x, &cov, control, m))
+        return false;
+    double least = ROUNDING * ROUNDING * set->ff / (double)set->count;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++)
+            m[i][j] += least * h[i][j];
+    sandwich(cov.inverse, m, pure);
+    for (int i = 0; i < N; i++)
+        cov.rise[i] = cov.inverse[i][i] / pure[i][i];
+    if (set->u || cov.dof >= 1)
+        combine(h, m, space, cov.known, cov.c);
+    else
+        say_nothing(&cov);
     *ret_cov = cov;
     return true;
 }

@@ -6,10 +6,12 @@
 
 enum { N = FIT_PARAMS, SWEEPS = 30 };
 
-static void rotate(double a[N][N], double v[N][N], int p, int q)
+// Turns a[p][q] to zero; false when it is nothing beside its own diagonal already, which keeps small
+// eigenvalues accurate (Demmel and Veselic 1992).
+static bool rotate(double a[N][N], double v[N][N], int p, int q)
 {
-    if (a[p][q] == 0)
-        return;
+    if (a[p][q] * a[p][q] <= 1e-34 * fabs(a[p][p] * a[q][q]))
+        return false;
     double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
     double t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
     double c = 1 / sqrt(t * t + 1), s = t * c;
@@ -25,6 +27,8 @@ static void rotate(double a[N][N], double v[N][N], int p, int q)
         v[p][i] = c * vx - s * vy;
         v[q][i] = s * vx + c * vy;
     }
+    a[p][q] = a[q][p] = 0;
+    return true;
 }
 
 void eigen_symmetric(const double a[N][N], double ret_value[N], double ret_vector[N][N])
@@ -34,16 +38,12 @@ void eigen_symmetric(const double a[N][N], double ret_value[N], double ret_vecto
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++)
             ret_vector[i][j] = i == j;
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        double off = 0, on = 0;
-        for (int i = 0; i < N; i++)
-            for (int j = 0; j < N; j++)
-                *(i == j ? &on : &off) += work[i][j] * work[i][j];
-        if (off <= 1e-34 * on)
-            break;
+    bool turned = true;
+    for (int sweep = 0; sweep < SWEEPS && turned; sweep++) {
+        turned = false;
         for (int p = 0; p < N; p++)
             for (int q = p + 1; q < N; q++)
-                rotate(work, ret_vector, p, q);
+                turned |= rotate(work, ret_vector, p, q);
     }
     for (int i = 0; i < N; i++)
         ret_value[i] = work[i][i];

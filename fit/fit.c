@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fit/fit.h"
 
+#include "fit/bootstrap.h"
 #include "fit/memetic.h"
 #include "fit/objective.h"
 #include "fit/paper_ga.h"
@@ -84,6 +85,7 @@ static int check_options(const struct fit_options *o, bool with_u)
 {
     bool ok = weighting_ok(o, with_u) && bounds_ok(&o->lower, &o->upper) && o->threads >= 1 &&
               o->threads <= 64 && o->u_scale >= 0 && o->u_scale <= 1e6 &&
+              o->bootstrap >= 0 && o->bootstrap <= BOOTSTRAP_MOST &&
               (o->diffuse == BRDF_DIFFUSE_PAPER || o->diffuse == BRDF_DIFFUSE_LAMBERT) &&
               (o->method == FIT_MEMETIC || (o->method == FIT_PAPER && paper_ok(&o->paper)));
     return ok ? 0 : FIT_E_OPTIONS;

@@ -80,6 +80,7 @@ struct fit_options {
     uint64_t seed;
     int threads; // 1..64, the calling one among them: same result to the bit, whatever it is
     double u_scale; // type B: relative standard uncertainty of a scale common to all readings
+    int bootstrap;  // replicas, 0..100000; 0: none (fit/bootstrap.h says which kind)
     struct fit_paper_options paper;
     bool (*canceled)(void *ctx); // NULL: never; asked every 1-2 ms of work at any size
     void *cancel_ctx;
@@ -91,8 +92,8 @@ struct fit_options {
 // else from the residuals (robust against unequal variances). They hold nothing of what the model
 // cannot follow. On a bound: all five parameters stay free in the covariance, each with its bounds
 // as weak prior knowledge (fit/covariance.h), so that u of sigma, kd, ks_r0 and ks_r45 stays what
-// it is and u of a parameter that the data do not identify is at most that of the bounds
-// (distance/sqrt(12); for k by way of k^2). A held parameter has u = 0 and lo95 = hi95 = value. NAN
+// it is and u of a parameter that the data do not identify is at most half the bounds' distance
+// (for k by way of k^2). A held parameter has u = 0 and lo95 = hi95 = value. NAN
 // for u, lo95, hi95, correlation and derived u when there are no u_per_sr and no more readings than
 // free parameters: nothing tells noise then.
 struct fit_estimate {
@@ -106,6 +107,17 @@ struct fit_estimate {
 
 struct fit_derived {
     double value, u;
+};
+
+struct fit_spread {
+    double u, lo95, hi95; // standard deviation, 2.5 % and 97.5 % quantiles of the replicas
+};
+
+// Noise, and u_scale where it applies. NAN throughout when replicas is 0.
+struct fit_bootstrap {
+    int replicas;
+    bool parametric; // noise drawn from u_per_sr; false: the residuals with random signs
+    struct fit_spread param[FIT_PARAMS], ks_r0, ks_r45;
 };
 
 enum fit_warning {
@@ -127,6 +139,7 @@ struct fit_result {
     struct fit_derived dhr_0, dhr_45, dhr_60; // directional-hemispherical reflectance of the fit
     double correlation[FIT_PARAMS][FIT_PARAMS];
     double chi2_per_dof;    // NAN without u_per_sr
+    struct fit_bootstrap bootstrap;
     double residual_lag1; // autocorrelation of neighbouring weighted residuals within a sweep; NAN:
                           // none
     unsigned warnings;      // of fit_warning

@@ -132,7 +132,7 @@ static bool one_interval(struct walk *w, struct fit_optimum *lowest, struct prof
         return true;
     }
     double u = first_step(w->which, x, sqrt(own));
-    w->scale = w->cov->inverse[w->which][w->which] / own;
+    w->scale = w->cov->rise[w->which];
     return find_end(w, -1, u, &ret_profile->lo95, lowest) &&
            find_end(w, +1, u, &ret_profile->hi95, lowest);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fit/uncertainty.h"
 
+#include "fit/bootstrap.h"
 #include "fit/covariance.h"
 #include "fit/kernel.h"
 #include "fit/objective.h"
@@ -191,12 +192,15 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
         return FIT_E_CANCELED;
     if (!explore(set, &space, control, &top, &cov, profile))
         return FIT_E_CANCELED;
+    int stop = bootstrap_run(set, options, &top, &cov, control, &r.bootstrap);
+    if (stop)
+        return stop;
     if (options->method == FIT_MEMETIC)
         *optimum = top;
     else if (!covariance_at(set, &space, optimum->x, control, &cov))
         return FIT_E_CANCELED;
     r.params = within_bounds(optimum->x, options);
-    int stop = objective_delta(set, &r.params, control, &r.delta);
+    stop = objective_delta(set, &r.params, control, &r.delta);
     if (!stop)
         stop = residuals_study(data, set, &r.params, control, &res);
     if (stop)
