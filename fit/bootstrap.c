@@ -24,7 +24,8 @@ struct work {
     double *values[QUANTITIES];
 };
 
-// --- one replica ----------------------------------------------------------------------------------
+// --- one replica
+// ----------------------------------------------------------------------------------
 
 static bool draw(struct work *w, struct rng *rng)
 {
@@ -90,7 +91,8 @@ static bool run(struct work *w)
     return true;
 }
 
-// --- what they say --------------------------------------------------------------------------------
+// --- what they say
+// --------------------------------------------------------------------------------
 
 static struct fit_spread spread(double *values, int count)
 {
@@ -148,8 +150,12 @@ int bootstrap_run(const struct fit_set *set, const struct fit_options *options,
     struct fit_bootstrap result;
     say_nothing(&result);
     result.parametric = set->u != NULL;
-    struct work w = {.set = set, .options = options, .best = best, .control = control,
-                     .space = space_of_options(options), .replica = *set};
+    struct work w = {.set = set,
+                     .options = options,
+                     .best = best,
+                     .control = control,
+                     .space = space_of_options(options),
+                     .replica = *set};
     double *memory = NULL;
     int stop = 0;
     if (replicas < 2 || isnan(covariance_u(cov, (const double[FIT_PARAMS]){1, 1, 1, 1, 1})))

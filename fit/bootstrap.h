@@ -17,9 +17,9 @@
 
 #define BOOTSTRAP_MOST 100000
 
-// options: bootstrap (replicas, 0..BOOTSTRAP_MOST), seed, u_scale and the bounds. Takes 7 numbers of
-// memory a replica. Spreads are NAN where nothing tells noise (cov is NAN) and for fewer than 2 replicas.
-// 0 or a negative fit_stop.
+// options: bootstrap (replicas, 0..BOOTSTRAP_MOST), seed, u_scale and the bounds. Takes 7 numbers
+// of memory a replica. Spreads are NAN where nothing tells noise (cov is NAN) and for fewer than 2
+// replicas. 0 or a negative fit_stop.
 int bootstrap_run(const struct fit_set *set, const struct fit_options *options,
                   const struct fit_optimum *best, const struct covariance *cov,
                   struct fit_control *control, struct fit_bootstrap *ret_bootstrap);

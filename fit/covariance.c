@@ -125,21 +125,20 @@ static void sandwich(const double outer[N][N], const double inner[N][N], double 
                 ret[i][j] += left[i][k] * outer[k][j];
 }
 
-// (H M^-1 H + P^-1)^-1.
-static void combine(const double h[N][N], const double m[N][N], const struct fit_space *space,
-                    const bool known[N], double ret[N][N])
+void covariance_combine(const double information[N][N], const struct fit_space *space,
+                        double ret_c[N][N])
 {
-    double inverse[N][N], information[N][N];
-    invert(m, known, inverse);
-    sandwich(h, inverse, information);
+    double sum[N][N];
+    bool known[N];
     for (int i = 0; i < N; i++) {
         double half = (space->upper[i] - space->lower[i]) / 2;
-        for (int j = 0; j < i; j++)
-            information[i][j] = information[j][i];
+        known[i] = !(half > 0);
+        for (int j = 0; j < N; j++)
+            sum[i][j] = (information[i][j] + information[j][i]) / 2;
         if (!known[i])
-            information[i][i] += 1 / (half * half);
+            sum[i][i] += 1 / (half * half);
     }
-    invert(information, known, ret);
+    invert(sum, known, ret_c);
 }
 
 static void say_nothing(struct covariance *cov)
@@ -170,8 +169,10 @@ bool covariance_at(const struct fit_set *set, const struct fit_space *space, con
     sandwich(cov.inverse, m, pure);
     for (int i = 0; i < N; i++)
         cov.rise[i] = cov.inverse[i][i] / pure[i][i];
+    invert(m, cov.known, pure);
+    sandwich(h, pure, cov.information);
     if (set->u || cov.dof >= 1)
-        combine(h, m, space, cov.known, cov.c);
+        covariance_combine(cov.information, space, cov.c);
     else
         say_nothing(&cov);
     *ret_cov = cov;

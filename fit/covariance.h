@@ -22,6 +22,7 @@
 struct covariance {
     double c[FIT_PARAMS][FIT_PARAMS];
     double inverse[FIT_PARAMS][FIT_PARAMS]; // H^-1
+    double information[FIT_PARAMS][FIT_PARAMS]; // H M^-1 H: of the readings alone, without bounds
     // Of a parameter held at a distance d from the optimum, q rises by about d^2 / inverse[i][i];
     // that times rise[i] is (d/u)^2 with the sandwich's u, without bounds.
     double rise[FIT_PARAMS];
@@ -39,6 +40,10 @@ bool covariance_at(const struct fit_set *set, const struct fit_space *space,
 // what kernel_jacobian says of the `count` readings from `at` on, at the optimum that cov belongs to.
 void covariance_noise(const struct fit_set *set, const struct covariance *cov,
                       const struct kernel_block *b, size_t at, size_t count, double *ret_s);
+
+// (information + P^-1)^-1: what estimates have that the readings and the bounds know together.
+void covariance_combine(const double information[FIT_PARAMS][FIT_PARAMS],
+                        const struct fit_space *space, double ret_c[FIT_PARAMS][FIT_PARAMS]);
 
 // Standard uncertainty of a quantity whose gradient by x is `gradient`.
 double covariance_u(const struct covariance *cov, const double gradient[FIT_PARAMS]);

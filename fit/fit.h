@@ -120,6 +120,24 @@ struct fit_bootstrap {
     struct fit_spread param[FIT_PARAMS], ks_r0, ks_r45;
 };
 
+// What might be measured next (fit/advice.h).
+enum fit_measurement {
+    FIT_MEASURE_NOTHING,  // no further reading, but the weights 1/u^2 for those there are
+    FIT_MEASURE_AGAIN,     // the same readings once more: what the others are compared with
+    FIT_MEASURE_GRAZING,   // sweeps at larger theta_i, up to 80 deg
+    FIT_MEASURE_LASER_SP,  // s- and p-polarised laser, no analyser
+    FIT_MEASURE_PARALLEL,  // s laser behind an s analyser, and p behind p
+    FIT_MEASURE_LINEAR_3X3, // s, p and +45 deg of laser and analyser: nine channels
+    FIT_MEASUREMENTS
+};
+
+struct fit_advice {
+    enum fit_measurement what;
+    double u[FIT_PARAMS]; // that the parameters would have then, as in fit_estimate.u
+    double gain;          // mean of log(u now / u then) over the free parameters
+    double first_theta_i_rad, last_theta_i_rad; // FIT_MEASURE_GRAZING: of the new sweeps
+};
+
 enum fit_warning {
     FIT_WARN_DHR_ABOVE_ONE = 1 << 0, // the fitted surface reflects more than it receives
     FIT_WARN_N_BELOW_ONE = 1 << 1,   // unphysical for a paint or a dielectric
@@ -140,6 +158,9 @@ struct fit_result {
     double correlation[FIT_PARAMS][FIT_PARAMS];
     double chi2_per_dof;    // NAN without u_per_sr
     struct fit_bootstrap bootstrap;
+    struct fit_advice advice[FIT_MEASUREMENTS]; // the most helpful first
+    int advice_count;                           // 0: nothing tells noise
+    size_t advice_readings;                     // that each but FIT_MEASURE_NOTHING would add
     double residual_lag1; // autocorrelation of neighbouring weighted residuals within a sweep; NAN:
                           // none
     unsigned warnings;      // of fit_warning
@@ -174,6 +195,11 @@ void fit_param_range(enum fit_param p, double *ret_least, double *ret_most);
 // One sentence a person can act on, for one bit of result->warnings; the numbers are in it.
 // Returns the length that snprintf would.
 int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text, size_t size);
+
+// What of the `which`-th advice a person needs: "s- and p-polarised laser: u(n) 141 % -> 33 %", for
+// the parameter that gains most. Returns the length that snprintf would.
+int fit_advice_text(const struct fit_result *r, int which, char *text, size_t size);
+const char *fit_measurement_name(enum fit_measurement m); // "nothing", "again", "grazing", ...
 
 // Eq. 17 at given parameters: sum g (model - f)^2 / sum g f^2; NAN outside the model's domain.
 // Bounds are checked but p need not lie within them. Negative fit_stop on bad data.

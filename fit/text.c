@@ -54,6 +54,47 @@ static bool unidentified(const struct fit_estimate *e)
     return !e->identified;
 }
 
+static int measurement_text(const struct fit_advice *a, char *text, size_t size)
+{
+    const double deg = 57.295779513082321;
+    switch (a->what) {
+    case FIT_MEASURE_NOTHING:
+        return snprintf(text, size, "weights 1/u^2 for the readings there are");
+    case FIT_MEASURE_AGAIN: return snprintf(text, size, "the same readings again");
+    case FIT_MEASURE_GRAZING:
+        return snprintf(text, size, "theta_i from %.0f to %.0f deg", a->first_theta_i_rad * deg,
+                        a->last_theta_i_rad * deg);
+    case FIT_MEASURE_LASER_SP: return snprintf(text, size, "s- and p-polarised laser");
+    case FIT_MEASURE_PARALLEL:
+        return snprintf(text, size, "s and p laser, each behind its own analyser");
+    case FIT_MEASURE_LINEAR_3X3:
+        return snprintf(text, size, "s, p and +45 deg of laser and analyser (3x3 linear block)");
+    case FIT_MEASUREMENTS: break;
+    }
+    return snprintf(text, size, "?");
+}
+
+int fit_advice_text(const struct fit_result *r, int which, char *text, size_t size)
+{
+    const struct fit_advice *a = &r->advice[which];
+    char what[100];
+    int most = 0;
+    double ratio = 0;
+    for (int i = 0; i < FIT_PARAMS; i++)
+        if (a->u[i] > 0 && r->estimate[i].u / a->u[i] > ratio) {
+            ratio = r->estimate[i].u / a->u[i];
+            most = i;
+        }
+    const struct fit_estimate *e = &r->estimate[most];
+    measurement_text(a, what, sizeof what);
+    if (e->value > 0 && e->u < 100 * e->value)
+        return snprintf(text, size, "%s: u(%s) %.2g %% -> %.2g %%", what,
+                        fit_param_name((enum fit_param)most), 100 * e->u / e->value,
+                        100 * a->u[most] / e->value);
+    return snprintf(text, size, "%s: u(%s) %.2g -> %.2g", what,
+                    fit_param_name((enum fit_param)most), e->u, a->u[most]);
+}
+
 static int model_error_text(const struct fit_result *r, char *text, size_t size)
 {
     static const char advice[] = "the intervals hold noise only, not what the model cannot follow";

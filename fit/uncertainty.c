@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fit/uncertainty.h"
 
+#include "fit/advice.h"
 #include "fit/bootstrap.h"
 #include "fit/covariance.h"
 #include "fit/kernel.h"
@@ -210,6 +211,8 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
     add_scale(&cov, x, options->u_scale);
     fill_estimates(options, &cov, x, profile, &r);
     fill_correlation(&cov, &r);
+    if (!advise(data, options, &cov, control, &r))
+        return FIT_E_CANCELED;
     r.ks_r0 = ks_reflectance(&cov, &r.params, 0);
     r.ks_r45 = ks_reflectance(&cov, &r.params, PI / 4);
     r.dhr_0 = dhr(&cov, &r.params, options->diffuse, 0, control);

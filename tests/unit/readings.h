@@ -70,7 +70,7 @@ static inline double readings_model(const struct readings *r, const struct brdf_
 static inline struct readings readings_paper(void)
 {
     static const double sweep[] = {0, 5, 10, 20, 30, 40, 45, 50, 55, 60};
-    struct readings r = readings_new(1000);
+    struct readings r = readings_new(2000);
     for (int s = 0; s < 10; s++)
         for (int i = -850; i <= 850; i += 5) {
             double tr = i / 10.0;

@@ -81,7 +81,8 @@ static void spread_is_the_covariance_where_the_model_is_nearly_linear(void **sta
     readings_free(&r);
 }
 
-// Noise that is tenfold on one reading in two hundred: an urn of residuals would spread it over all.
+// Noise that is tenfold on one reading in two hundred: an urn of residuals would spread it over
+// all.
 static void wild_noise_stays_where_it_was(void **state)
 {
     (void)state;
@@ -151,7 +152,8 @@ static void none_or_too_few_say_nothing(void **state)
     readings_free(&r);
 }
 
-// --- cancelling -----------------------------------------------------------------------------------
+// --- cancelling
+// -----------------------------------------------------------------------------------
 
 struct deadline {
     struct timespec asked;

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: MIT
+#include "fit/advice.h"
+
+#include "model/channel.h"
+#include "model/fresnel.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { N = FIT_PARAMS, DIRECTIONS = 600, SAMPLE = 2000, NOISE_ROUNDS = 12 };
+#define PI 3.14159265358979323846
+#define RAD (PI / 180)
+#define GRAZING_MOST_DEG 80
+#define GRAZING_STEP_DEG 5
+
+// --- one reading
+// ----------------------------------------------------------------------------------
+
+// What f takes of a direction at given parameters: height times the channel's mix of Fresnel terms.
+struct direction {
+    double height; // v A exp(-v tan^2 theta)
+    double slope;  // d log(height) / d log(sigma)
+    double inv_cos_i;
+    struct brdf_fresnel f, by_n, by_kappa; // terms and their derivatives
+};
+
+static struct brdf_fresnel difference(struct brdf_fresnel a, struct brdf_fresnel b, double step)
+{
+    return (struct brdf_fresnel){(a.ss - b.ss) / step, (a.pp - b.pp) / step, (a.re - b.re) / step,
+                                 (a.im - b.im) / step};
+}
+
+// Differences over a 1e-5 of n and k^2, forward where k^2 has no room below: good to 1e-5.
+static struct direction direction_at(const struct brdf_geometry *g, const double x[N])
+{
+    double n = x[FIT_N], kappa = x[FIT_K], v = 0.5 * exp(-2 * x[FIT_SIGMA]);
+    double s2 = g->sin2_beta, c2 = g->cos2_beta, dn = 1e-5 * n, dk = 1e-5 * (n * n + kappa);
+    double low = fmax(0, kappa - dk), high = kappa + dk;
+    return (struct direction){
+        .height = v * g->spec_per_sr * exp(-v * g->tan2_theta),
+        .slope = 2 * v * g->tan2_theta - 2,
+        .inv_cos_i = g->inv_cos_i,
+        .f = brdf_fresnel(n, sqrt(kappa), s2, c2),
+        .by_n = difference(brdf_fresnel(n + dn, sqrt(kappa), s2, c2),
+                           brdf_fresnel(n - dn, sqrt(kappa), s2, c2), 2 * dn),
+        .by_kappa = difference(brdf_fresnel(n, sqrt(high), s2, c2),
+                               brdf_fresnel(n, sqrt(low), s2, c2), high - low),
+    };
+}
+
+static double mix(const struct brdf_channel *c, const struct brdf_fresnel *f)
+{
+    return c->w_ss * f->ss + c->w_pp * f->pp + c->w_re * f->re + c->w_im * f->im;
+}
+
+// f and its derivatives by the coordinates.
+static double reading(const struct direction *d, const struct brdf_channel *c, const double x[N],
+                      enum brdf_diffuse diffuse, double j[N])
+{
+    double ks = x[FIT_KS], a = d->height * mix(c, &d->f);
+    double b = c->w_kd * (diffuse == BRDF_DIFFUSE_PAPER ? d->inv_cos_i : 1 / PI);
+    j[FIT_N] = ks * d->height * mix(c, &d->by_n);
+    j[FIT_K] = ks * d->height * mix(c, &d->by_kappa);
+    j[FIT_SIGMA] = ks * a * d->slope;
+    j[FIT_KS] = a;
+    j[FIT_KD] = b;
+    return ks * a + x[FIT_KD] * b;
+}
+
+// --- the data's noise
+// -----------------------------------------------------------------------------
+
+static enum brdf_state state_of(const unsigned char *states, size_t i)
+{
+    return states ? (enum brdf_state)states[i] : BRDF_STATE_U;
+}
+
+static size_t stride_of(size_t count, size_t most)
+{
+    return (count + most - 1) / most;
+}
+
+// f^2 of the model and the noise's square for up to SAMPLE readings; their count.
+static size_t sample_noise(const struct fit_data *d, enum brdf_diffuse diffuse, const double x[N],
+                           double f2[SAMPLE], double s2[SAMPLE])
+{
+    size_t stride = stride_of(d->count, SAMPLE), used = 0;
+    double lost = (double)d->count / fmax(1, (double)d->count - N);
+    for (size_t i = 0; i < d->count; i += stride, used++) {
+        struct brdf_geometry g =
+            brdf_geometry(d->theta_i_rad[i], d->theta_r_rad[i], d->dphi_rad[i]);
+        struct brdf_channel c = brdf_channel(&g, state_of(d->pol_in, i), state_of(d->pol_out, i));
+        struct direction at = direction_at(&g, x);
+        double j[N], f = reading(&at, &c, x, diffuse, j), r = d->f_per_sr[i] - f;
+        f2[used] = f * f;
+        s2[used] = d->u_per_sr ? d->u_per_sr[i] * d->u_per_sr[i] : r * r * lost;
+    }
+    return used;
+}
+
+// Least squares of s2 = a f2 + b with a and b >= 0, weighted with the variance that s2 has at the
+// last a and b: it scatters in proportion to itself.
+struct advice_noise advice_noise(const struct fit_data *data, enum brdf_diffuse diffuse,
+                                 const double x[N])
+{
+    double f2[SAMPLE], s2[SAMPLE], a = 0, b = 0;
+    size_t count = sample_noise(data, diffuse, x, f2, s2);
+    for (size_t i = 0; i < count; i++)
+        b += s2[i] / (double)count;
+    for (int round = 0; round < NOISE_ROUNDS; round++) {
+        double n = 0, sx = 0, sxx = 0, sy = 0, sxy = 0, least = 1e-12 * b;
+        for (size_t i = 0; i < count; i++) {
+            double w = 1 / fmax(a * f2[i] + b, least);
+            w *= w;
+            n += w;
+            sx += w * f2[i];
+            sxx += w * f2[i] * f2[i];
+            sy += w * s2[i];
+            sxy += w * f2[i] * s2[i];
+        }
+        double det = n * sxx - sx * sx;
+        double slope = det > 0 ? (n * sxy - sx * sy) / det : 0;
+        double level = det > 0 ? (sxx * sy - sx * sxy) / det : sy / n;
+        if (slope < 0 || level < 0) { // one of them alone
+            bool flat = slope < 0 || !(sxx > 0);
+            slope = flat ? 0 : sxy / sxx;
+            level = flat ? sy / n : 0;
+        }
+        if (!(slope + level > 0) || !isfinite(slope + level))
+            break;
+        a = slope;
+        b = level;
+    }
+    return (struct advice_noise){sqrt(a), sqrt(b)};
+}
+
+// --- information
+// ----------------------------------------------------------------------------------
+
+void advice_information(const struct advice_plan *plan, const double x[N],
+                        enum brdf_diffuse diffuse, const struct advice_noise *noise,
+                        double ret[N][N])
+{
+    memset(ret, 0, N * sizeof *ret);
+    for (size_t i = 0; i < plan->count; i++) {
+        struct brdf_geometry g =
+            brdf_geometry(plan->theta_i_rad[i], plan->theta_r_rad[i], plan->dphi_rad[i]);
+        struct direction at = direction_at(&g, x);
+        for (int k = 0; k < plan->channels; k++) {
+            struct brdf_channel c = brdf_channel(&g, plan->in[k], plan->out[k]);
+            double j[N], f = reading(&at, &c, x, diffuse, j);
+            double u2 = noise->relative * noise->relative * f * f +
+                        noise->floor_per_sr * noise->floor_per_sr;
+            for (int p = 0; p < N && u2 > 0; p++)
+                for (int q = 0; q < N; q++)
+                    ret[p][q] += j[p] * j[q] / u2;
+        }
+    }
+}
+
+// --- candidates
+// -----------------------------------------------------------------------------------
+
+struct directions {
+    size_t count;
+    double ti[DIRECTIONS], tr[DIRECTIONS], dphi[DIRECTIONS];
+};
+
+static void add_direction(struct directions *d, double ti, double tr, double dphi)
+{
+    if (d->count == DIRECTIONS)
+        return;
+    d->ti[d->count] = ti;
+    d->tr[d->count] = tr;
+    d->dphi[d->count++] = dphi;
+}
+
+static struct directions as_measured(const struct fit_data *data)
+{
+    struct directions d = {.count = 0};
+    for (size_t i = 0; i < data->count; i += stride_of(data->count, DIRECTIONS))
+        add_direction(&d, data->theta_i_rad[i], data->theta_r_rad[i], data->dphi_rad[i]);
+    return d;
+}
+
+static double largest(const double *values, size_t count)
+{
+    double most = 0;
+    for (size_t i = 0; i < count; i++)
+        most = fmax(most, values[i]);
+    return most;
+}
+
+// Sweeps in the plane of incidence: every 2.5 deg, every degree within 5 deg of specular.
+static struct directions grazing(const struct fit_data *data, struct fit_advice *advice)
+{
+    struct directions d = {.count = 0};
+    double from_deg = largest(data->theta_i_rad, data->count) / RAD, first_deg;
+    double reach_deg =
+        fmin(85, floor(largest(data->theta_r_rad, data->count) / RAD * 2 + 0.01) / 2);
+    first_deg =
+        GRAZING_STEP_DEG * floor(from_deg / GRAZING_STEP_DEG + 1.2); // a degree further at least
+    for (double ti = first_deg; ti <= GRAZING_MOST_DEG; ti += GRAZING_STEP_DEG) {
+        for (double tr = -reach_deg; tr <= reach_deg; tr += 0.5) {
+            bool coarse = fabs(remainder(tr, 2.5)) < 0.01;
+            bool dense = fabs(tr - ti) < 5.01 && fabs(remainder(tr, 1)) < 0.01;
+            if ((coarse || dense) && fabs(tr + ti) > 0.01)
+                add_direction(&d, ti * RAD, fabs(tr) * RAD, tr < 0 ? 0 : PI);
+        }
+        advice->last_theta_i_rad = ti * RAD;
+    }
+    advice->first_theta_i_rad = first_deg * RAD;
+    return d;
+}
+
+static const struct candidate {
+    const char *name;
+    int channels; // 0: those of the data
+    enum brdf_state in[ADVICE_CHANNELS], out[ADVICE_CHANNELS];
+} candidates[FIT_MEASUREMENTS] = {
+    [FIT_MEASURE_NOTHING] = {"nothing", 0, {BRDF_STATE_U}, {BRDF_STATE_U}},
+    [FIT_MEASURE_AGAIN] = {"again", 0, {BRDF_STATE_U}, {BRDF_STATE_U}},
+    [FIT_MEASURE_GRAZING] = {"grazing", 0, {BRDF_STATE_U}, {BRDF_STATE_U}},
+    [FIT_MEASURE_LASER_SP] = {"laser_sp",
+                              2,
+                              {BRDF_STATE_S, BRDF_STATE_P},
+                              {BRDF_STATE_U, BRDF_STATE_U}},
+    [FIT_MEASURE_PARALLEL] = {"parallel_sp",
+                              2,
+                              {BRDF_STATE_S, BRDF_STATE_P},
+                              {BRDF_STATE_S, BRDF_STATE_P}},
+    [FIT_MEASURE_LINEAR_3X3] = {"linear_3x3",
+                                9,
+                                {BRDF_STATE_S, BRDF_STATE_S, BRDF_STATE_S, BRDF_STATE_P,
+                                 BRDF_STATE_P, BRDF_STATE_P, BRDF_STATE_PLUS45, BRDF_STATE_PLUS45,
+                                 BRDF_STATE_PLUS45},
+                                {BRDF_STATE_S, BRDF_STATE_P, BRDF_STATE_PLUS45, BRDF_STATE_S,
+                                 BRDF_STATE_P, BRDF_STATE_PLUS45, BRDF_STATE_S, BRDF_STATE_P,
+                                 BRDF_STATE_PLUS45}},
+};
+
+const char *fit_measurement_name(enum fit_measurement m)
+{
+    return m < FIT_MEASUREMENTS ? candidates[m].name : "?";
+}
+
+// The different channels in the data, the first ADVICE_CHANNELS of them.
+static void channels_of(const struct fit_data *d, struct advice_plan *plan)
+{
+    plan->channels = 0;
+    for (size_t i = 0; i < d->count && plan->channels < ADVICE_CHANNELS; i++) {
+        enum brdf_state in = state_of(d->pol_in, i), out = state_of(d->pol_out, i);
+        bool is_new = true;
+        for (int k = 0; k < plan->channels; k++)
+            is_new = is_new && (plan->in[k] != in || plan->out[k] != out);
+        if (is_new) {
+            plan->in[plan->channels] = in;
+            plan->out[plan->channels++] = out;
+        }
+        if (!d->pol_in && !d->pol_out)
+            break;
+    }
+}
+
+static double u_of_coordinate(int i, const double x[N], double variance)
+{
+    double spread = sqrt(variance);
+    return i == FIT_K       ? sqrt(x[i] + spread) - sqrt(x[i])
+           : i == FIT_SIGMA ? exp(x[i]) * spread
+                            : spread;
+}
+
+struct question {
+    const struct fit_data *data;
+    const struct fit_options *options;
+    const struct covariance *cov;
+    struct advice_noise noise;
+    double x[N];
+    const struct fit_result *result;
+};
+
+// u then, and the gain over u now.
+static void answer(const struct question *q, const double added[N][N], struct fit_advice *a)
+{
+    struct fit_space space = space_of_options(q->options);
+    double sum[N][N], c[N][N], gain = 0, free = 0;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++)
+            sum[i][j] =
+                (a->what == FIT_MEASURE_NOTHING ? 0 : q->cov->information[i][j]) + added[i][j];
+    covariance_combine(sum, &space, c);
+    for (int i = 0; i < N; i++) {
+        double scale = i >= FIT_KS && !q->cov->known[i] ? q->options->u_scale * q->x[i] : 0;
+        a->u[i] = u_of_coordinate(i, q->x, c[i][i] + scale * scale);
+        if (a->u[i] > 0 && q->result->estimate[i].u > 0) {
+            gain += log(q->result->estimate[i].u / a->u[i]);
+            free++;
+        }
+    }
+    a->gain = free > 0 ? gain / free : 0;
+}
+
+// False when there is nothing to be measured.
+static bool consider(const struct question *q, enum fit_measurement what, struct fit_advice *a)
+{
+    const struct candidate *candidate = &candidates[what];
+    struct advice_plan plan = {.channels = candidate->channels};
+    double added[N][N];
+    *a = (struct fit_advice){.what = what};
+    struct directions d = what == FIT_MEASURE_GRAZING ? grazing(q->data, a) : as_measured(q->data);
+    plan.count = d.count;
+    plan.theta_i_rad = d.ti;
+    plan.theta_r_rad = d.tr;
+    plan.dphi_rad = d.dphi;
+    memcpy(plan.in, candidate->in, sizeof plan.in);
+    memcpy(plan.out, candidate->out, sizeof plan.out);
+    if (plan.channels == 0)
+        channels_of(q->data, &plan);
+    if (plan.count == 0)
+        return false;
+    advice_information(&plan, q->x, q->options->diffuse, &q->noise, added);
+    double effort = (double)q->data->count / (double)plan.count / plan.channels;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++)
+            added[i][j] *= effort;
+    answer(q, added, a);
+    return isfinite(a->gain);
+}
+
+bool advise(const struct fit_data *data, const struct fit_options *options,
+            const struct covariance *cov, struct fit_control *control, struct fit_result *r)
+{
+    struct question q = {.data = data, .options = options, .cov = cov, .result = r};
+    r->advice_count = 0;
+    r->advice_readings = data->count;
+    for (int i = 0; i < N; i++)
+        if (isnan(cov->c[i][i]))
+            return true;
+    space_of_params(&r->params, q.x);
+    q.noise = advice_noise(data, options->diffuse, q.x);
+    if (!(q.noise.relative + q.noise.floor_per_sr > 0))
+        return true;
+    for (int what = 0; what < FIT_MEASUREMENTS; what++) {
+        struct fit_advice a;
+        if (control_ask(control))
+            return false;
+        if (what == FIT_MEASURE_NOTHING && options->weighting == FIT_VARIANCE)
+            continue;
+        if (!consider(&q, (enum fit_measurement)what, &a))
+            continue;
+        int place = r->advice_count++;
+        for (; place > 0 && r->advice[place - 1].gain < a.gain; place--)
+            r->advice[place] = r->advice[place - 1];
+        r->advice[place] = a;
+    }
+    return true;
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Which further measurement would help most: for each of a few candidates, the uncertainties that
+// the fit would have with it, computed from the Fisher information of the candidate's readings at
+// the fitted parameters, added to what the data hold already.
+//
+// FIT_MEASURE_NOTHING is there unless the weights are 1/u^2 already: other weights waste readings,
+// and what a candidate gains beyond it is the candidate's own. Candidates are compared at the same
+// effort: each adds as many readings as the data have, spread over its channels. Polarised ones
+// look in the directions of the data, FIT_MEASURE_GRAZING at sweeps every 5 deg from beyond the
+// largest theta_i of the data to 80 deg, theta_r as far out as the data go. Their noise is that of
+// the data: a relative part and a floor, fitted to the data's u or, without u, to the residuals.
+// Linear theory at a point: a parameter on its bound or in a curved valley can do otherwise, and
+// nothing of it covers model error.
+#pragma once
+#include "fit/covariance.h"
+
+struct advice_noise { // u^2 = (relative f)^2 + floor^2
+    double relative, floor_per_sr;
+};
+
+// From the readings at the fitted parameters, at most some thousand of them.
+struct advice_noise advice_noise(const struct fit_data *data, enum brdf_diffuse diffuse,
+                                 const double x[FIT_PARAMS]);
+
+// Directions of a measurement, and the channels measured in each of them.
+#define ADVICE_CHANNELS 9
+struct advice_plan {
+    size_t count;
+    const double *theta_i_rad, *theta_r_rad, *dphi_rad;
+    int channels;
+    enum brdf_state in[ADVICE_CHANNELS], out[ADVICE_CHANNELS];
+};
+
+// sum J J^T / u^2 over all directions and channels, in the coordinates of fit/space.h.
+void advice_information(const struct advice_plan *plan, const double x[FIT_PARAMS],
+                        enum brdf_diffuse diffuse, const struct advice_noise *noise,
+                        double ret_information[FIT_PARAMS][FIT_PARAMS]);
+
+// Fills advice, advice_count and advice_readings from the parameters already in *result. False when
+// canceled.
+bool advise(const struct fit_data *data, const struct fit_options *options,
+            const struct covariance *cov, struct fit_control *control, struct fit_result *result);
