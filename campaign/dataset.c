@@ -18,12 +18,19 @@ struct dataset_filter dataset_filter_all(void)
     return (struct dataset_filter){.theta_i_max_deg = (double)INFINITY};
 }
 
+static bool among(const double *list_deg, int count, double theta_i_deg)
+{
+    bool found = false;
+    for (int i = 0; i < count; i++)
+        found = found || fabs(list_deg[i] - theta_i_deg) <= SAME_ANGLE_DEG;
+    return found;
+}
+
 static bool passes(const struct dataset_filter *f, double theta_i_deg)
 {
-    bool listed = f->theta_i_count == 0;
-    for (int i = 0; i < f->theta_i_count; i++)
-        listed = listed || fabs(f->theta_i_deg[i] - theta_i_deg) <= SAME_ANGLE_DEG;
-    return listed && theta_i_deg <= f->theta_i_max_deg + SAME_ANGLE_DEG;
+    return (f->theta_i_count == 0 || among(f->theta_i_deg, f->theta_i_count, theta_i_deg)) &&
+           !among(f->without_deg, f->without_count, theta_i_deg) &&
+           theta_i_deg <= f->theta_i_max_deg + SAME_ANGLE_DEG;
 }
 
 void dataset_clear(struct dataset *d)

@@ -23,6 +23,8 @@ struct dataset_filter {
     double theta_i_max_deg; // INFINITY: all
     double theta_i_deg[DATASET_ANGLES];
     int theta_i_count; // 0: all
+    double without_deg[DATASET_ANGLES]; // these sweeps are left out, whatever the rest says
+    int without_count;
 };
 
 struct dataset {

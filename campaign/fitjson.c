@@ -73,6 +73,52 @@ static json_t *correlation(const struct fit_result *r)
     return all;
 }
 
+static json_t *spread(const struct fit_spread *s)
+{
+    return json_pack("{s:o, s:o, s:o}", "u", number(s->u), "lo95", number(s->lo95), "hi95",
+                     number(s->hi95));
+}
+
+static json_t *bootstrap(const struct fit_bootstrap *b)
+{
+    json_t *all = json_object();
+    for (int i = 0; i < FIT_PARAMS; i++)
+        json_object_set_new(all, fit_param_name((enum fit_param)i), spread(&b->param[i]));
+    return json_pack("{s:i, s:s, s:o, s:{s:o, s:o}}", "replicas", b->replicas, "noise",
+                     b->parametric ? "parametric" : "wild", "params", all, "derived", "ks_r0",
+                     spread(&b->ks_r0), "ks_r45", spread(&b->ks_r45));
+}
+
+static json_t *advice(const struct fit_result *r)
+{
+    json_t *all = json_array();
+    for (int i = 0; i < r->advice_count; i++) {
+        const struct fit_advice *a = &r->advice[i];
+        const size_t readings = a->what == FIT_MEASURE_NOTHING ? 0 : r->advice_readings;
+        json_t *u = json_object();
+        char text[300];
+        for (int p = 0; p < FIT_PARAMS; p++)
+            json_object_set_new(u, fit_param_name((enum fit_param)p), number(a->u[p]));
+        fit_advice_text(r, i, text, sizeof text);
+        json_array_append_new(all, json_pack("{s:s, s:s, s:I, s:o, s:o}", "measure",
+                                             fit_measurement_name(a->what), "text", text,
+                                             "readings", (json_int_t)readings, "u", u, "gain",
+                                             number(a->gain)));
+    }
+    return all;
+}
+
+static json_t *hold_out(const struct fit_hold_out *h)
+{
+    const struct fit_validation *v = &h->validation;
+    json_t *angles = json_array();
+    for (int i = 0; i < h->count; i++)
+        json_array_append_new(angles, json_real(h->theta_i_deg[i]));
+    return json_pack("{s:o, s:I, s:o, s:o, s:o}", "theta_i_deg", angles, "points",
+                     (json_int_t)v->points, "delta", number(v->delta), "chi2_per_point",
+                     number(v->chi2_per_point), "rms_relative", number(v->rms_relative));
+}
+
 static json_t *warnings(const struct fit_record *f)
 {
     const struct fit_result *r = &f->result;
@@ -102,6 +148,12 @@ char *fit_json(const struct fit_record *f, int indent)
     json_object_set_new(o, "derived", derived(r));
     json_object_set_new(o, "correlation", correlation(r));
     json_object_set_new(o, "chi2_per_dof", number(r->chi2_per_dof));
+    json_object_set_new(o, "residual_lag1", number(r->residual_lag1));
+    if (f->options.bootstrap > 0)
+        json_object_set_new(o, "bootstrap", bootstrap(&r->bootstrap));
+    if (f->hold_out.count > 0)
+        json_object_set_new(o, "hold_out", hold_out(&f->hold_out));
+    json_object_set_new(o, "advice", advice(r));
     json_object_set_new(o, "evaluations", json_integer(r->evaluations));
     json_object_set_new(o, "elapsed_ms", number(r->elapsed_ms));
     json_object_set_new(o, "elapsed_total_ms", number(r->elapsed_total_ms));

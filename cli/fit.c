@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // fit: the model's parameters from a CSV or a campaign file. Works without the daemon.
+#include "base/units.h"
 #include "campaign/catalog.h"
 #include "campaign/dataset.h"
 #include "campaign/fitjson.h"
@@ -18,11 +19,11 @@
 
 struct options {
     bool json;
-    const char *column, *angles, *trace, *dir;
+    const char *column, *angles, *hold_out, *trace, *dir;
     struct fit_words words;
     struct fit_paper_words paper;
     double theta_i_max_deg;
-    long seed, threads;
+    long seed, threads, bootstrap;
 };
 
 static const struct option_row rows[] = {
@@ -32,6 +33,8 @@ static const struct option_row rows[] = {
      "leave out larger angles of incidence"},
     {"--theta-i", OPTION_TEXT, offsetof(struct options, angles), "LIST", 0, 0,
      "only these: 0,10,20"},
+    {"--hold-out", OPTION_TEXT, offsetof(struct options, hold_out), "LIST", 0, 0,
+     "do not fit these theta_i, but say how well the fit describes them"},
     {"--weights", OPTION_TEXT, offsetof(struct options, words.weights), "W", 0, 0,
      "uniform, dense:G, relative or variance (variance when every value has u_f_r)"},
     {"--method", OPTION_TEXT, offsetof(struct options, words.method), "M", 0, 0,
@@ -56,6 +59,8 @@ static const struct option_row rows[] = {
      "of the search (1)"},
     {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64,
      "share the work; the result is the same (1)"},
+    {"--bootstrap", OPTION_INT, offsetof(struct options, bootstrap), "N", 0, 100000,
+     "fit N data sets that might have been measured: u and intervals by repetition (0)"},
     {"--trace", OPTION_TEXT, offsetof(struct options, trace), "FILE", 0, 0,
      "write each generation's Delta as CSV"},
     {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
@@ -90,10 +95,17 @@ static int filter_of(const struct options *o, struct dataset_filter *ret_filter,
     if (isfinite(o->theta_i_max_deg))
         f.theta_i_max_deg = o->theta_i_max_deg;
     if (o->angles) {
-        int count = fit_angles_take(o->angles, f.theta_i_deg, FIT_MOST_ANGLES, err);
+        int count = fit_angles_take("--theta-i", o->angles, f.theta_i_deg, FIT_MOST_ANGLES, err);
         if (count < 0)
             return count;
         f.theta_i_count = count;
+    }
+    if (o->hold_out) {
+        int count =
+            fit_angles_take("--hold-out", o->hold_out, f.without_deg, FIT_MOST_ANGLES, err);
+        if (count < 0)
+            return count;
+        f.without_count = count;
     }
     *ret_filter = f;
     return GON_OK;
@@ -117,7 +129,7 @@ static int load_campaign(const struct options *o, const char *file, struct datas
     rc = rc < 0 ? rc : store_read_config(store, &config, err);
     if (rc == 0) {
         *options = campaign_fit_options(&config);
-        if (!isfinite(o->theta_i_max_deg))
+        if (!isfinite(filter->theta_i_max_deg))
             filter->theta_i_max_deg = config.fit.theta_i_max_deg;
         rc = dataset_from_store(store, filter, ret_data, NULL, err);
     }
@@ -132,16 +144,22 @@ static bool is_file(const char *path) // "-" is standard input
     return access(path, F_OK) == 0 || errno != ENOENT; // opening a FIFO would wait for its writer
 }
 
+static int load_file(const struct options *o, const char *file, struct dataset_filter *filter,
+                     struct dataset *ret_data, struct fit_options *options, bool *ret_campaign,
+                     struct gon_error *err)
+{
+    *ret_campaign = ends_with(file, STORE_SUFFIX) || !is_file(file);
+    return *ret_campaign ? load_campaign(o, file, filter, ret_data, options, err)
+                         : dataset_from_csv(file, o->column, filter, ret_data, err);
+}
+
 static int load(const struct options *o, const char *file, struct dataset *ret_data,
                 struct fit_options *options, struct gon_error *err)
 {
     struct dataset_filter filter;
+    bool campaign;
     int rc = filter_of(o, &filter, err);
-    if (rc < 0)
-        return rc;
-    bool campaign = ends_with(file, STORE_SUFFIX) || !is_file(file);
-    rc = campaign ? load_campaign(o, file, &filter, ret_data, options, err)
-                  : dataset_from_csv(file, o->column, &filter, ret_data, err);
+    rc = rc < 0 ? rc : load_file(o, file, &filter, ret_data, options, &campaign, err);
     if (rc < 0)
         return rc;
     if (!campaign && ret_data->u_per_sr)
@@ -158,6 +176,7 @@ static int set_options(const struct options *o, struct fit_options *options, str
     if (o->seed >= 0)
         options->seed = (uint64_t)o->seed;
     options->threads = o->threads > 0 ? (int)o->threads : 1;
+    options->bootstrap = (int)o->bootstrap;
     options->canceled = canceled;
     return rc;
 }
@@ -206,6 +225,54 @@ static int search(const struct dataset *data, const struct options *o, struct fi
     return rc;
 }
 
+// Each angle must be there: a mistyped one would pass for a good validation of the others. The
+// encoder's angle may differ from the plan's by a little.
+static int check_held_out(const struct dataset *data, const struct fit_hold_out *h,
+                          struct gon_error *err)
+{
+    for (int i = 0; i < h->count; i++) {
+        bool found = false;
+        for (size_t j = 0; j < data->count && !found; j++)
+            found = fabs(units_deg(data->theta_i_rad[j]) - h->theta_i_deg[i]) < 0.01;
+        if (!found)
+            return gon_fail(err, GON_E_INPUT, "--hold-out %g: %s has no sweep at that theta_i",
+                            h->theta_i_deg[i], data->source);
+    }
+    return GON_OK;
+}
+
+// Reads the sweeps that were not fitted and compares them with the fit.
+static int validate(const struct options *o, const char *file, struct fit_record *record,
+                    struct gon_error *err)
+{
+    struct dataset_filter filter = dataset_filter_all();
+    struct fit_options ignored = record->options;
+    struct dataset data = {0};
+    bool campaign;
+    int count =
+        o->hold_out
+            ? fit_angles_take("--hold-out", o->hold_out, filter.theta_i_deg, FIT_MOST_ANGLES, err)
+            : 0;
+    if (count <= 0)
+        return count;
+    filter.theta_i_count = record->hold_out.count = count;
+    filter.theta_i_max_deg = 90;
+    memcpy(record->hold_out.theta_i_deg, filter.theta_i_deg, sizeof filter.theta_i_deg);
+    int rc = load_file(o, file, &filter, &data, &ignored, &campaign, err);
+    rc = rc < 0 ? rc : check_held_out(&data, &record->hold_out, err);
+    if (rc == GON_OK) {
+        struct fit_data d = dataset_fit_data(&data);
+        int stop = fit_validate(&d, &record->options, &record->result.params,
+                                &record->hold_out.validation);
+        if (stop == FIT_E_CANCELED)
+            rc = gon_fail(err, GON_E_CANCELED, "interrupted");
+        else if (stop < 0)
+            rc = gon_fail(err, GON_E_INPUT, "--hold-out %s: %s", o->hold_out, fit_stop_text(stop));
+    }
+    dataset_clear(&data);
+    return rc;
+}
+
 static int print(const struct fit_record *record, const struct dataset *data, bool json)
 {
     char *text = fit_json(record, json ? 2 : 0);
@@ -242,6 +309,7 @@ static int run_fit(const struct verb *verb, int argc, char **argv)
     rc = rc < 0 ? rc : set_options(&o, &record.options, &err);
     rc = rc < 0 ? rc : check_weights(&record.options, &data, o.column, &err);
     rc = rc < 0 ? rc : search(&data, &o, &record.options, &record.result, &err);
+    rc = rc < 0 ? rc : validate(&o, file, &record, &err);
     record.points = data.count;
     snprintf(record.note, sizeof record.note, "%s", data.note);
     int status = rc < 0 ? out_fail(&err) : print(&record, &data, o.json);

@@ -173,13 +173,14 @@ int fit_paper_take(const struct fit_paper_words *w, struct fit_options *options,
     return GON_OK;
 }
 
-int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_error *err)
+int fit_angles_take(const char *option, const char *text, double *ret_deg, int most,
+                    struct gon_error *err)
 {
     char copy[1000];
     double deg[FIT_MOST_ANGLES];
     int count = 0;
     if (strlen(text) >= sizeof copy)
-        return gon_fail(err, GON_E_INPUT, "--theta-i is longer than %zu characters",
+        return gon_fail(err, GON_E_INPUT, "%s is longer than %zu characters", option,
                         sizeof copy - 1);
     strcpy(copy, text);
     for (char *part = copy, *end; part; part = end ? end + 1 : NULL) {
@@ -187,11 +188,12 @@ int fit_angles_take(const char *text, double *ret_deg, int most, struct gon_erro
         if (end)
             *end = 0;
         if (count == most || count == FIT_MOST_ANGLES)
-            return gon_fail(err, GON_E_INPUT, "--theta-i: at most %d angles", most);
+            return gon_fail(err, GON_E_INPUT, "%s '%.60s': at most %d angles", option, text, most);
         if (options_real(part, &deg[count]) < 0 || deg[count] < 0 || deg[count] >= 90)
             return gon_fail(err, GON_E_INPUT,
-                            "--theta-i '%s' is not an angle of 0..90 deg; give a list: 0,10,20",
-                            part);
+                            "%s '%s' is not an angle of 0..90 deg (90 excluded); give a list: "
+                            "0,10,20",
+                            option, part);
         count++;
     }
     memcpy(ret_deg, deg, (size_t)count * sizeof *deg);

@@ -62,6 +62,66 @@ static void plain(struct table *t, const char *name, double value)
         table_cell(t, "%s", "");
 }
 
+static void text_row(struct table *t, const char *name, const char *text)
+{
+    table_cell(t, "%s", name);
+    for (int i = 0; i < 4; i++)
+        table_cell(t, "%s", "");
+    table_cell(t, "%s", text);
+}
+
+static void repeated(struct table *t, const json_t *all, const char *key, const char *name,
+                     const char *note)
+{
+    const json_t *s = json_object_get(all, key);
+    double u = number(s, "u");
+    table_cell(t, "%s", name);
+    table_cell(t, "%s", "");
+    cell(t, u, u);
+    cell(t, number(s, "lo95"), u);
+    cell(t, number(s, "hi95"), u);
+    table_cell(t, "%s", note);
+}
+
+static void bootstrap_rows(struct table *t, const json_t *b)
+{
+    static const char *const names[] = {"n", "k", "sigma", "ks", "kd"};
+    char note[80], name[40];
+    if (!b)
+        return;
+    snprintf(note, sizeof note, "of %.0f replicas, %s noise", number(b, "replicas"),
+             json_string_value(json_object_get(b, "noise")));
+    for (int i = 0; i < 5; i++) {
+        snprintf(name, sizeof name, "%s, bootstrap", names[i]);
+        repeated(t, json_object_get(b, "params"), names[i], name, i == 0 ? note : "");
+    }
+    repeated(t, json_object_get(b, "derived"), "ks_r0", "ks*R(0), bootstrap", "");
+    repeated(t, json_object_get(b, "derived"), "ks_r45", "ks*R(45), bootstrap", "");
+}
+
+static void hold_out_row(struct table *t, const json_t *h)
+{
+    char text[200];
+    if (!h)
+        return;
+    int length = snprintf(text, sizeof text, "Delta %.3g, rms of residual/model %.2g %%",
+                          number(h, "delta"), 100 * number(h, "rms_relative"));
+    if (isfinite(number(h, "chi2_per_point")))
+        snprintf(text + length, sizeof text - (size_t)length, ", chi2/point %.3g",
+                 number(h, "chi2_per_point"));
+    text_row(t, "held out", text);
+}
+
+static void advice_row(struct table *t, const json_t *advice)
+{
+    const json_t *best = json_array_get(advice, 0);
+    char text[400];
+    if (!best)
+        return;
+    snprintf(text, sizeof text, "%s", json_string_value(json_object_get(best, "text")));
+    text_row(t, "helps most", text);
+}
+
 void fitview_print(const json_t *fit)
 {
     static const char *const names[] = {"n", "k", "sigma", "ks", "kd"};
@@ -83,6 +143,11 @@ void fitview_print(const json_t *fit)
     plain(t, "Delta", number(fit, "delta"));
     if (isfinite(number(fit, "chi2_per_dof")))
         plain(t, "chi2/dof", number(fit, "chi2_per_dof"));
+    if (isfinite(number(fit, "residual_lag1")))
+        plain(t, "lag-1 r", number(fit, "residual_lag1"));
+    bootstrap_rows(t, json_object_get(fit, "bootstrap"));
+    hold_out_row(t, json_object_get(fit, "hold_out"));
+    advice_row(t, json_object_get(fit, "advice"));
     table_print(t, stdout);
     fflush(stdout);
 

@@ -66,8 +66,8 @@ static bool accumulate_h(const struct fit_set *set, const double x[N], struct fi
     return true;
 }
 
-static bool accumulate_m(const struct fit_set *set, const double x[N],
-                         const struct covariance *cov, struct fit_control *control, double m[N][N])
+static bool accumulate_m(const struct fit_set *set, const double x[N], const struct covariance *cov,
+                         struct fit_control *control, double m[N][N])
 {
     struct kernel_block b;
     double s[KERNEL_BLOCK];

@@ -5,15 +5,15 @@
 // known, else the residuals with leverages taken out, r/(1 - h) (HC3, MacKinnon and White 1985),
 // which needs no noise model.
 //
-// What f_00 does not identify (n, k and ks together) leaves H nearly singular. The estimate with its
-// sandwich is therefore combined, as one measurement with another, with what is known beforehand:
-// that each parameter lies within its bounds, C = (H M^-1 H + P^-1)^-1 with P = diag(width/2)^2, the
-// largest variance there is between two bounds (Popoviciu 1935). This keeps C finite for a parameter
-// that the data say nothing of, or that sits on its bound, hardly changes what is identified, and
-// needs no case for bounds. (Half the width covers best: with the variance of a uniform distribution,
-// or with bounds as ridge terms in H, u of identified quantities was 10 % too small or 35 % too large
-// under uniform weights.) A parameter with equal bounds is known: its u is 0. Eigenvalues of the
-// scaled matrices, not inverses, are what is used.
+// What f_00 does not identify (n, k and ks together) leaves H nearly singular. The estimate with
+// its sandwich is therefore combined, as one measurement with another, with what is known
+// beforehand: that each parameter lies within its bounds, C = (H M^-1 H + P^-1)^-1 with P =
+// diag(width/2)^2, the largest variance there is between two bounds (Popoviciu 1935). This keeps C
+// finite for a parameter that the data say nothing of, or that sits on its bound, hardly changes
+// what is identified, and needs no case for bounds. (Half the width covers best: with the variance
+// of a uniform distribution, or with bounds as ridge terms in H, u of identified quantities was 10
+// % too small or 35 % too large under uniform weights.) A parameter with equal bounds is known: its
+// u is 0. Eigenvalues of the scaled matrices, not inverses, are what is used.
 #pragma once
 #include "fit/control.h"
 #include "fit/kernel.h"
@@ -21,7 +21,7 @@
 
 struct covariance {
     double c[FIT_PARAMS][FIT_PARAMS];
-    double inverse[FIT_PARAMS][FIT_PARAMS]; // H^-1
+    double inverse[FIT_PARAMS][FIT_PARAMS];     // H^-1
     double information[FIT_PARAMS][FIT_PARAMS]; // H M^-1 H: of the readings alone, without bounds
     // Of a parameter held at a distance d from the optimum, q rises by about d^2 / inverse[i][i];
     // that times rise[i] is (d/u)^2 with the sandwich's u, without bounds.
@@ -36,8 +36,9 @@ bool covariance_at(const struct fit_set *set, const struct fit_space *space,
                    const double x[FIT_PARAMS], struct fit_control *control,
                    struct covariance *ret_cov);
 
-// The noise s of a block of readings, times sqrt(g): u, or the residual r/(1 - h) with its sign. b is
-// what kernel_jacobian says of the `count` readings from `at` on, at the optimum that cov belongs to.
+// The noise s of a block of readings, times sqrt(g): u, or the residual r/(1 - h) with its sign. b
+// is what kernel_jacobian says of the `count` readings from `at` on, at the optimum that cov
+// belongs to.
 void covariance_noise(const struct fit_set *set, const struct covariance *cov,
                       const struct kernel_block *b, size_t at, size_t count, double *ret_s);
 

@@ -6,8 +6,8 @@
 
 enum { N = FIT_PARAMS, SWEEPS = 30 };
 
-// Turns a[p][q] to zero; false when it is nothing beside its own diagonal already, which keeps small
-// eigenvalues accurate (Demmel and Veselic 1992).
+// Turns a[p][q] to zero; false when it is nothing beside its own diagonal already, which keeps
+// small eigenvalues accurate (Demmel and Veselic 1992).
 static bool rotate(double a[N][N], double v[N][N], int p, int q)
 {
     if (a[p][q] * a[p][q] <= 1e-34 * fabs(a[p][p] * a[q][q]))

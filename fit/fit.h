@@ -201,6 +201,17 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
 int fit_advice_text(const struct fit_result *r, int which, char *text, size_t size);
 const char *fit_measurement_name(enum fit_measurement m); // "nothing", "again", "grazing", ...
 
+// How well parameters describe readings that were held out of their fit. A negative fit_stop on fewer
+// than five readings, bad data or options.
+struct fit_validation {
+    size_t points;
+    double delta;          // eq. 17 with the weights given
+    double chi2_per_point; // sum (r/u)^2 / points, about 1 where only noise is left; NAN without u
+    double rms_relative;   // root mean square of (f - model)/model
+};
+int fit_validate(const struct fit_data *data, const struct fit_options *options,
+                 const struct brdf_params *p, struct fit_validation *ret_validation);
+
 // Eq. 17 at given parameters: sum g (model - f)^2 / sum g f^2; NAN outside the model's domain.
 // Bounds are checked but p need not lie within them. Negative fit_stop on bad data.
 int fit_delta(const struct fit_data *data, const struct fit_options *options,

@@ -64,12 +64,12 @@ static void angles_are_a_list(void **state)
     (void)state;
     struct gon_error err;
     double deg[3];
-    assert_int_equal(fit_angles_take("0,10,20.5", deg, 3, &err), 3);
+    assert_int_equal(fit_angles_take("--theta-i", "0,10,20.5", deg, 3, &err), 3);
     assert_true(deg[0] == 0 && deg[1] == 10 && deg[2] == 20.5);
-    assert_int_equal(fit_angles_take("0,1,2,3", deg, 3, &err), GON_E_INPUT);
-    assert_int_equal(fit_angles_take("0,,3", deg, 3, &err), GON_E_INPUT);
-    assert_int_equal(fit_angles_take("90", deg, 3, &err), GON_E_INPUT);
-    assert_int_equal(fit_angles_take("-1", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("--theta-i", "0,1,2,3", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("--theta-i", "0,,3", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("--theta-i", "90", deg, 3, &err), GON_E_INPUT);
+    assert_int_equal(fit_angles_take("--theta-i", "-1", deg, 3, &err), GON_E_INPUT);
 }
 
 static void refuses_paper(struct fit_paper_words w, enum fit_method method, const char *text)
