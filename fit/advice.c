@@ -1,159 +1,42 @@
 // SPDX-License-Identifier: MIT
 #include "fit/advice.h"
 
-#include "model/channel.h"
-#include "model/fresnel.h"
+#include "fit/noise.h"
+#include "fit/reading.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { N = FIT_PARAMS, DIRECTIONS = 600, SAMPLE = 2000, NOISE_ROUNDS = 12 };
+enum { N = FIT_PARAMS, DIRECTIONS = 600 };
 #define PI 3.14159265358979323846
 #define RAD (PI / 180)
 #define GRAZING_MOST_DEG 80
 #define GRAZING_STEP_DEG 5
-
-// --- one reading
-// ----------------------------------------------------------------------------------
-
-// What f takes of a direction at given parameters: height times the channel's mix of Fresnel terms.
-struct direction {
-    double height; // v A exp(-v tan^2 theta)
-    double slope;  // d log(height) / d log(sigma)
-    double inv_cos_i;
-    struct brdf_fresnel f, by_n, by_kappa; // terms and their derivatives
-};
-
-static struct brdf_fresnel difference(struct brdf_fresnel a, struct brdf_fresnel b, double step)
-{
-    return (struct brdf_fresnel){(a.ss - b.ss) / step, (a.pp - b.pp) / step, (a.re - b.re) / step,
-                                 (a.im - b.im) / step};
-}
-
-// Differences over a 1e-5 of n and k^2, forward where k^2 has no room below: good to 1e-5.
-static struct direction direction_at(const struct brdf_geometry *g, const double x[N])
-{
-    double n = x[FIT_N], kappa = x[FIT_K], v = 0.5 * exp(-2 * x[FIT_SIGMA]);
-    double s2 = g->sin2_beta, c2 = g->cos2_beta, dn = 1e-5 * n, dk = 1e-5 * (n * n + kappa);
-    double low = fmax(0, kappa - dk), high = kappa + dk;
-    return (struct direction){
-        .height = v * g->spec_per_sr * exp(-v * g->tan2_theta),
-        .slope = 2 * v * g->tan2_theta - 2,
-        .inv_cos_i = g->inv_cos_i,
-        .f = brdf_fresnel(n, sqrt(kappa), s2, c2),
-        .by_n = difference(brdf_fresnel(n + dn, sqrt(kappa), s2, c2),
-                           brdf_fresnel(n - dn, sqrt(kappa), s2, c2), 2 * dn),
-        .by_kappa = difference(brdf_fresnel(n, sqrt(high), s2, c2),
-                               brdf_fresnel(n, sqrt(low), s2, c2), high - low),
-    };
-}
-
-static double mix(const struct brdf_channel *c, const struct brdf_fresnel *f)
-{
-    return c->w_ss * f->ss + c->w_pp * f->pp + c->w_re * f->re + c->w_im * f->im;
-}
-
-// f and its derivatives by the coordinates.
-static double reading(const struct direction *d, const struct brdf_channel *c, const double x[N],
-                      enum brdf_diffuse diffuse, double j[N])
-{
-    double ks = x[FIT_KS], a = d->height * mix(c, &d->f);
-    double b = c->w_kd * (diffuse == BRDF_DIFFUSE_PAPER ? d->inv_cos_i : 1 / PI);
-    j[FIT_N] = ks * d->height * mix(c, &d->by_n);
-    j[FIT_K] = ks * d->height * mix(c, &d->by_kappa);
-    j[FIT_SIGMA] = ks * a * d->slope;
-    j[FIT_KS] = a;
-    j[FIT_KD] = b;
-    return ks * a + x[FIT_KD] * b;
-}
-
-// --- the data's noise
-// -----------------------------------------------------------------------------
-
-static enum brdf_state state_of(const unsigned char *states, size_t i)
-{
-    return states ? (enum brdf_state)states[i] : BRDF_STATE_U;
-}
 
 static size_t stride_of(size_t count, size_t most)
 {
     return (count + most - 1) / most;
 }
 
-// f^2 of the model and the noise's square for up to SAMPLE readings; their count.
-static size_t sample_noise(const struct fit_data *d, enum brdf_diffuse diffuse, const double x[N],
-                           double f2[SAMPLE], double s2[SAMPLE])
-{
-    size_t stride = stride_of(d->count, SAMPLE), used = 0;
-    double lost = (double)d->count / fmax(1, (double)d->count - N);
-    for (size_t i = 0; i < d->count; i += stride, used++) {
-        struct brdf_geometry g =
-            brdf_geometry(d->theta_i_rad[i], d->theta_r_rad[i], d->dphi_rad[i]);
-        struct brdf_channel c = brdf_channel(&g, state_of(d->pol_in, i), state_of(d->pol_out, i));
-        struct direction at = direction_at(&g, x);
-        double j[N], f = reading(&at, &c, x, diffuse, j), r = d->f_per_sr[i] - f;
-        f2[used] = f * f;
-        s2[used] = d->u_per_sr ? d->u_per_sr[i] * d->u_per_sr[i] : r * r * lost;
-    }
-    return used;
-}
-
-// Least squares of s2 = a f2 + b with a and b >= 0, weighted with the variance that s2 has at the
-// last a and b: it scatters in proportion to itself.
-struct advice_noise advice_noise(const struct fit_data *data, enum brdf_diffuse diffuse,
-                                 const double x[N])
-{
-    double f2[SAMPLE], s2[SAMPLE], a = 0, b = 0;
-    size_t count = sample_noise(data, diffuse, x, f2, s2);
-    for (size_t i = 0; i < count; i++)
-        b += s2[i] / (double)count;
-    for (int round = 0; round < NOISE_ROUNDS; round++) {
-        double n = 0, sx = 0, sxx = 0, sy = 0, sxy = 0, least = 1e-12 * b;
-        for (size_t i = 0; i < count; i++) {
-            double w = 1 / fmax(a * f2[i] + b, least);
-            w *= w;
-            n += w;
-            sx += w * f2[i];
-            sxx += w * f2[i] * f2[i];
-            sy += w * s2[i];
-            sxy += w * f2[i] * s2[i];
-        }
-        double det = n * sxx - sx * sx;
-        double slope = det > 0 ? (n * sxy - sx * sy) / det : 0;
-        double level = det > 0 ? (sxx * sy - sx * sxy) / det : sy / n;
-        if (slope < 0 || level < 0) { // one of them alone
-            bool flat = slope < 0 || !(sxx > 0);
-            slope = flat ? 0 : sxy / sxx;
-            level = flat ? sy / n : 0;
-        }
-        if (!(slope + level > 0) || !isfinite(slope + level))
-            break;
-        a = slope;
-        b = level;
-    }
-    return (struct advice_noise){sqrt(a), sqrt(b)};
-}
-
 // --- information
 // ----------------------------------------------------------------------------------
 
 void advice_information(const struct advice_plan *plan, const double x[N],
-                        enum brdf_diffuse diffuse, const struct advice_noise *noise,
+                        enum brdf_diffuse diffuse, const struct noise *noise,
                         double ret[N][N])
 {
     memset(ret, 0, N * sizeof *ret);
     for (size_t i = 0; i < plan->count; i++) {
         struct brdf_geometry g =
             brdf_geometry(plan->theta_i_rad[i], plan->theta_r_rad[i], plan->dphi_rad[i]);
-        struct direction at = direction_at(&g, x);
+        struct reading_direction at = reading_direction(&g, x);
         for (int k = 0; k < plan->channels; k++) {
             struct brdf_channel c = brdf_channel(&g, plan->in[k], plan->out[k]);
-            double j[N], f = reading(&at, &c, x, diffuse, j);
-            double u2 = noise->relative * noise->relative * f * f +
-                        noise->floor_per_sr * noise->floor_per_sr;
-            for (int p = 0; p < N && u2 > 0; p++)
+            double j[N], f = reading_jacobian(&at, &c, x, diffuse, j);
+            double u = noise_u(noise, f);
+            for (int p = 0; p < N && u > 0; p++)
                 for (int q = 0; q < N; q++)
-                    ret[p][q] += j[p] * j[q] / u2;
+                    ret[p][q] += j[p] / u * (j[q] / u);
         }
     }
 }
@@ -249,7 +132,7 @@ static void channels_of(const struct fit_data *d, struct advice_plan *plan)
 {
     plan->channels = 0;
     for (size_t i = 0; i < d->count && plan->channels < ADVICE_CHANNELS; i++) {
-        enum brdf_state in = state_of(d->pol_in, i), out = state_of(d->pol_out, i);
+        enum brdf_state in = reading_state(d->pol_in, i), out = reading_state(d->pol_out, i);
         bool is_new = true;
         for (int k = 0; k < plan->channels; k++)
             is_new = is_new && (plan->in[k] != in || plan->out[k] != out);
@@ -274,7 +157,7 @@ struct question {
     const struct fit_data *data;
     const struct fit_options *options;
     const struct covariance *cov;
-    struct advice_noise noise;
+    struct noise noise;
     double x[N];
     const struct fit_result *result;
 };
@@ -337,7 +220,7 @@ bool advise(const struct fit_data *data, const struct fit_options *options,
         if (isnan(cov->c[i][i]))
             return true;
     space_of_params(&r->params, q.x);
-    q.noise = advice_noise(data, options->diffuse, q.x);
+    q.noise = noise_of(data, options->diffuse, q.x);
     if (!(q.noise.relative + q.noise.floor_per_sr > 0))
         return true;
     for (int what = 0; what < FIT_MEASUREMENTS; what++) {

@@ -13,14 +13,7 @@
 // nothing of it covers model error.
 #pragma once
 #include "fit/covariance.h"
-
-struct advice_noise { // u^2 = (relative f)^2 + floor^2
-    double relative, floor_per_sr;
-};
-
-// From the readings at the fitted parameters, at most some thousand of them.
-struct advice_noise advice_noise(const struct fit_data *data, enum brdf_diffuse diffuse,
-                                 const double x[FIT_PARAMS]);
+#include "fit/noise.h"
 
 // Directions of a measurement, and the channels measured in each of them.
 #define ADVICE_CHANNELS 9
@@ -33,7 +26,7 @@ struct advice_plan {
 
 // sum J J^T / u^2 over all directions and channels, in the coordinates of fit/space.h.
 void advice_information(const struct advice_plan *plan, const double x[FIT_PARAMS],
-                        enum brdf_diffuse diffuse, const struct advice_noise *noise,
+                        enum brdf_diffuse diffuse, const struct noise *noise,
                         double ret_information[FIT_PARAMS][FIT_PARAMS]);
 
 // Fills advice, advice_count and advice_readings from the parameters already in *result. False when

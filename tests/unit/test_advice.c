@@ -14,7 +14,7 @@
 static const struct brdf_params truth[] = {{1.5, 0.02, 0.15, 0.9, 0.05},
                                            {1.3, 7.5, 0.12, 1, 0.01},
                                            {5.345064, 5.345064, 0.123451, 0.95, 0.092414}};
-static const struct advice_noise noise = {0.02, 1e-5};
+static const struct noise noise = {0.02, 1e-5};
 
 static void add_sweeps(struct readings *r, double from_deg, double to_deg)
 {
@@ -114,11 +114,11 @@ static void noise_is_that_of_the_data(void **state)
         double x[FIT_PARAMS];
         space_of_params(&truth[t], x);
         struct fit_data data = readings_data(&r, true);
-        struct advice_noise found = advice_noise(&data, BRDF_DIFFUSE_PAPER, x);
+        struct noise found = noise_of(&data, BRDF_DIFFUSE_PAPER, x);
         assert_near(found.relative, 0.02, 1e-7);
         assert_near(found.floor_per_sr, 1e-3, 1e-7);
         data.u_per_sr = NULL;
-        found = advice_noise(&data, BRDF_DIFFUSE_PAPER, x);
+        found = noise_of(&data, BRDF_DIFFUSE_PAPER, x);
         print_message("from residuals: %.4f and %.2e\n", found.relative, found.floor_per_sr);
         assert_near(found.relative, 0.02, 0.003);
         assert_near(
