@@ -31,18 +31,14 @@ static bool draw(struct work *w, struct rng *rng)
 {
     const bool parametric = w->set->u != NULL;
     uint64_t bits = 0;
-    double ff = 0;
     for (size_t i = 0; i < w->set->count; i++) {
         if (i % (CONTROL_SLICE / 4) == 0 && control_ask(w->control))
             return false;
         bits = i % 64 == 0 ? rng_next(rng) : bits >> 1;
         double e = parametric ? rng_normal(rng) : bits & 1 ? 1 : -1;
-        double f = w->model[i] + w->noise[i] * e;
-        w->replica.f[i] = f;
-        ff += f * f;
+        w->replica.all.f[i] = w->model[i] + w->noise[i] * e;
     }
-    w->replica.ff = ff;
-    return true;
+    return set_revalue(&w->replica, w->control) == 0;
 }
 
 static bool refit(struct work *w, struct fit_optimum *at)
@@ -135,7 +131,7 @@ static bool prepare(struct work *w, const struct covariance *cov)
             return false;
         size_t count = kernel_jacobian(w->set, x, at, &b);
         for (size_t i = 0; i < count; i++)
-            w->model[at + i] = w->set->f[at + i] - b.r[i];
+            w->model[at + i] = w->set->all.f[at + i] - b.r[i];
         covariance_noise(w->set, cov, &b, at, count, w->noise + at);
     }
     w->settled = SETTLED * w->best->q / fmax(1, cov->dof);
@@ -150,29 +146,27 @@ int bootstrap_run(const struct fit_set *set, const struct fit_options *options,
     struct fit_bootstrap result;
     say_nothing(&result);
     result.parametric = set->u != NULL;
-    struct work w = {.set = set,
-                     .options = options,
-                     .best = best,
-                     .control = control,
-                     .space = space_of_options(options),
-                     .replica = *set};
+    struct work w = {.set = set, .options = options, .best = best, .control = control};
     double *memory = NULL;
     int stop = 0;
     if (replicas < 2 || isnan(covariance_u(cov, (const double[FIT_PARAMS]){1, 1, 1, 1, 1})))
         goto out;
-    memory = calloc(3 * padded + QUANTITIES * replicas, sizeof *memory);
-    stop = memory ? 0 : FIT_E_MEMORY;
-    if (stop)
+    stop = set_replica(set, &w.replica);
+    memory = calloc(2 * padded + QUANTITIES * replicas, sizeof *memory);
+    if (stop || !memory) {
+        stop = FIT_E_MEMORY;
         goto out;
+    }
+    w.space = space_of_options(options);
     w.model = memory;
     w.noise = memory + padded;
-    w.replica.f = memory + 2 * padded;
     for (int j = 0; j < QUANTITIES; j++)
-        w.values[j] = memory + 3 * padded + (size_t)j * replicas;
+        w.values[j] = memory + 2 * padded + (size_t)j * replicas;
     if (prepare(&w, cov) && run(&w))
         summarise(&w, &result);
     stop = control->stop ? FIT_E_CANCELED : 0;
 out:
+    set_free(&w.replica);
     free(memory);
     if (!stop)
         *ret_bootstrap = result;

@@ -14,7 +14,7 @@ static int sum(const struct fit_set *set, const struct brdf_params *p, struct fi
     for (size_t i = 0; i < set->count; i++) {
         if (i % (CONTROL_SLICE / 8) == 0 && control_ask(control))
             return FIT_E_CANCELED;
-        double r = objective_residual(set, p, i), of_model = r / (set->f[i] - r);
+        double r = objective_residual(set, p, i), of_model = r / (set->all.f[i] - r);
         squares += r * r;
         relative += of_model * of_model;
         if (set->u)
