@@ -64,12 +64,22 @@ static double bootstrap_us(struct work *w)
     return now_us() - start;
 }
 
+// The paper's ten sweeps with 85 readings each.
+static struct readings plan(void)
+{
+    static const double sweep[] = {0, 5, 10, 20, 30, 40, 45, 50, 55, 60};
+    struct readings r = readings_new(850);
+    for (int s = 0; s < 10; s++)
+        for (int i = 0; i < 85; i++)
+            readings_add(&r, sweep[s], -83.7 + 2 * i, 0);
+    return r;
+}
+
 static void measure(const char *name, const struct brdf_params *truth, bool with_u)
 {
-    struct readings r = readings_paper();
+    struct readings r = plan();
     readings_measure(&r, truth, 0.02, 1e-5, 7);
     struct fit_data data = readings_data(&r, with_u);
-    data.count = data.count < 850 ? data.count : 850;
     struct fit_options o = fit_options_default();
     o.weighting = with_u ? FIT_VARIANCE : FIT_UNIFORM;
     struct fit_control control = {.canceled = NULL};

@@ -161,8 +161,8 @@ struct fit_result {
     struct fit_advice advice[FIT_MEASUREMENTS]; // the most helpful first
     int advice_count;                           // 0: nothing tells noise
     size_t advice_readings;                     // that each but FIT_MEASURE_NOTHING would add
-    double residual_lag1; // autocorrelation of neighbouring weighted residuals within a sweep; NAN:
-                          // none
+    double residual_lag1; // autocorrelation of neighbouring residuals within a sweep, each divided by
+                          // its noise, at the fit with weights 1/noise^2; NAN: none
     unsigned warnings;      // of fit_warning
     long evaluations;       // of the whole data set
     double elapsed_ms;       // search and polish

@@ -155,9 +155,9 @@ static void fill_warnings(const struct fit_options *o, const struct residuals *r
     }
     if (res->sweeps < 3)
         r->warnings |= FIT_WARN_FEW_SWEEPS;
-    // Chance does these once in 10,000 and once in 1,000,000 fits.
-    bool smooth = res->z > 3.7 && res->lag1 > 0.1;
-    if (smooth || (dof >= 1 && r->chi2_per_dof > 1 + 5 * sqrt(2 / dof)))
+    // Chance does these once in 10,000, in 1000 and in 1,000,000 fits.
+    bool smooth = (res->z > 3.7 && res->lag1 > 0.1) || res->signs_z > 3.1;
+    if (smooth || (dof >= 1 && res->least_chi2 / dof > 1 + 5 * sqrt(2 / dof)))
         r->warnings |= FIT_WARN_MODEL_ERROR;
 }
 
@@ -203,7 +203,7 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
     r.params = within_bounds(optimum->x, options);
     stop = objective_delta(set, &r.params, control, &r.delta);
     if (!stop)
-        stop = residuals_study(data, set, &r.params, control, &res);
+        stop = residuals_study(data, set, options, &r.params, &top, control, &res);
     if (stop)
         return stop;
     double x[FIT_PARAMS];
