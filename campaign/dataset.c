@@ -4,6 +4,7 @@
 #include "base/units.h"
 #include "campaign/csv.h"
 #include "campaign/direction.h"
+#include "campaign/polarisation.h"
 #include "campaign/reduce.h"
 
 #include <math.h>
@@ -42,6 +43,8 @@ void dataset_clear(struct dataset *d)
     free(d->dphi_rad);
     free(d->f_per_sr);
     free(d->u_per_sr);
+    free(d->pol_in);
+    free(d->pol_out);
     *d = (struct dataset){0};
 }
 
@@ -52,7 +55,9 @@ struct fit_data dataset_fit_data(const struct dataset *d)
                              .theta_r_rad = d->theta_r_rad,
                              .dphi_rad = d->dphi_rad,
                              .f_per_sr = d->f_per_sr,
-                             .u_per_sr = d->u_per_sr};
+                             .u_per_sr = d->u_per_sr,
+                             .pol_in = d->pol_in,
+                             .pol_out = d->pol_out};
 }
 
 // --- one row at a time
@@ -61,21 +66,31 @@ struct fit_data dataset_fit_data(const struct dataset *d)
 struct row {
     struct direction direction;
     double f, u; // u NAN: none
+    enum brdf_state in, out;
 };
 
-static bool grow(double **list, size_t room)
+static bool grow(void *list, size_t room, size_t size)
 {
-    double *larger = realloc(*list, room * sizeof *larger);
-    *list = larger ? larger : *list;
+    void **at = list, *larger = realloc(*at, room * size);
+    *at = larger ? larger : *at;
     return larger;
+}
+
+static bool grow_all(struct dataset *d, size_t room)
+{
+    double **const numbers[] = {&d->theta_i_rad, &d->theta_r_rad, &d->dphi_rad, &d->f_per_sr,
+                                &d->u_per_sr};
+    bool ok = grow(&d->pol_in, room, 1) && grow(&d->pol_out, room, 1);
+    for (int i = 0; i < 5; i++)
+        ok = ok && grow(numbers[i], room, sizeof **numbers[i]);
+    return ok;
 }
 
 static int add(struct dataset *d, size_t *room, const struct row *r, struct gon_error *err)
 {
     if (d->count == *room) {
         size_t more = *room ? 2 * *room : 1024;
-        if (!grow(&d->theta_i_rad, more) || !grow(&d->theta_r_rad, more) ||
-            !grow(&d->dphi_rad, more) || !grow(&d->f_per_sr, more) || !grow(&d->u_per_sr, more))
+        if (!grow_all(d, more))
             return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", d->source);
         *room = more;
     }
@@ -83,15 +98,19 @@ static int add(struct dataset *d, size_t *room, const struct row *r, struct gon_
     d->theta_r_rad[d->count] = units_rad(r->direction.theta_r_deg);
     d->dphi_rad[d->count] = units_rad(r->direction.dphi_deg);
     d->f_per_sr[d->count] = r->f;
+    d->pol_in[d->count] = (unsigned char)r->in;
+    d->pol_out[d->count] = (unsigned char)r->out;
     d->u_per_sr[d->count++] = r->u;
     return GON_OK;
 }
 
-// What must hold for all rows together; without an uncertainty in each row there is none.
+// What must hold for all rows together; without an uncertainty in each row there is none, and states
+// that are all u need no telling.
 static int finish(struct dataset *d, const char *column, struct gon_error *err)
 {
-    bool all_u = true, all_zero = true;
+    bool all_u = true, all_zero = true, polarised = false;
     for (size_t i = 0; i < d->count; i++) {
+        polarised = polarised || d->pol_in[i] != BRDF_STATE_U || d->pol_out[i] != BRDF_STATE_U;
         all_u = all_u && d->u_per_sr[i] > 0;
         all_zero = all_zero && d->f_per_sr[i] == 0;
     }
@@ -106,6 +125,11 @@ static int finish(struct dataset *d, const char *column, struct gon_error *err)
     if (!all_u) {
         free(d->u_per_sr);
         d->u_per_sr = NULL;
+    }
+    if (!polarised) {
+        free(d->pol_in);
+        free(d->pol_out);
+        d->pol_in = d->pol_out = NULL;
     }
     return GON_OK;
 }
@@ -139,15 +163,26 @@ static int find_columns(const struct csv *c, const char *column, struct columns 
     return rc;
 }
 
-static int check_unpolarised(const struct csv *c, int column, struct gon_error *err)
+static int take_state(const struct csv *c, int column, enum brdf_state *ret_state,
+                      struct gon_error *err)
 {
+    char name[8], all[60] = "";
+    *ret_state = BRDF_STATE_U;
     if (column < 0)
         return GON_OK;
     const struct csv_field f = csv_text(c, column);
     if (f.size == 1 && *f.text == 'u')
         return GON_OK;
-    return csv_fail(c, column, err,
-                    "only unpolarised data (u) can be fitted so far; leave the other rows out");
+    snprintf(name, sizeof name, "%.*s", f.size > 7 ? 0 : (int)f.size, f.text);
+    int state = brdf_state_find(name);
+    if (state >= 0) {
+        *ret_state = (enum brdf_state)state;
+        return GON_OK;
+    }
+    for (int i = 0; i < BRDF_STATES; i++)
+        snprintf(all + strlen(all), sizeof all - strlen(all), "%s%s", i ? ", " : "",
+                 brdf_state_name((enum brdf_state)i));
+    return csv_fail(c, column, err, "no state of polarisation; allowed %s", all);
 }
 
 static int take_row(const struct csv *c, const struct columns *k, struct row *r,
@@ -162,8 +197,8 @@ static int take_row(const struct csv *c, const struct columns *k, struct row *r,
     if (rc >= 0 && k->u >= 0 && !(r->u > 0))
         rc = csv_fail(c, k->u, err, "a standard uncertainty is above zero");
     if (rc >= 0)
-        rc = check_unpolarised(c, k->pol_in, err);
-    return rc >= 0 ? check_unpolarised(c, k->pol_out, err) : rc;
+        rc = take_state(c, k->pol_in, &r->in, err);
+    return rc >= 0 ? take_state(c, k->pol_out, &r->out, err) : rc;
 }
 
 static int take_rows(struct csv *c, const char *column, const struct dataset_filter *filter,
@@ -207,25 +242,30 @@ int dataset_from_csv(const char *path, const char *column, const struct dataset_
 // ----------------------------------------------------------------------------------
 
 // The encoder may say -0.0003 deg for 0: the same geometry with both signs turned round.
-static struct row row_of(const struct reduced_point *p)
+static struct row row_of(const struct reduced_point *p, enum brdf_state in, enum brdf_state out)
 {
     const double theta_r_deg = p->theta_i_deg < 0 ? -p->theta_r_deg : p->theta_r_deg;
     return (struct row){.direction = direction_in_plane(fabs(p->theta_i_deg), theta_r_deg),
                         .f = p->f_per_sr,
-                        .u = p->u_a_per_sr};
+                        .u = p->u_a_per_sr,
+                        .in = in,
+                        .out = out};
 }
 
-static int take_points(const struct plan *plan, const struct reduction *r,
+static int take_points(const struct plan *plan, const struct reduction *r, enum brdf_state out,
                        const struct dataset_filter *filter, struct dataset *d,
                        struct gon_error *err)
 {
+    // Light of an unknown state is taken for unpolarised, and a note says so.
+    const enum brdf_state in =
+        r->polarisation == POL_UNKNOWN ? BRDF_STATE_U : (enum brdf_state)r->polarisation;
     size_t room = 0;
     int rc = GON_OK;
     for (int i = 0, k = 0; k < r->count && rc >= 0; i++) {
         const struct reduced_point *p = &r->points[k];
         if (plan->points[i].sweep != p->sweep || plan->points[i].point != p->point)
             continue;
-        const struct row row = row_of(p);
+        const struct row row = row_of(p, in, out);
         if (passes(filter, plan->points[i].theta_i_deg))
             rc = add(d, &room, &row, err);
         else
@@ -236,18 +276,20 @@ static int take_points(const struct plan *plan, const struct reduction *r,
     return rc >= 0 ? finish(d, "f_r", err) : rc;
 }
 
-static int check_analyser(struct store *s, struct gon_error *err)
+_Static_assert((int)POL_U == (int)BRDF_STATE_U && (int)POL_L == (int)BRDF_STATE_L &&
+                   (int)POL_UNKNOWN == (int)BRDF_STATES,
+               "the states of a campaign are those of the model, and unknown");
+
+static int read_analyser(struct store *s, enum brdf_state *ret_out, struct gon_error *err)
 {
-    char *pol_out = store_read_meta(s, "pol_out");
-    int rc =
-        pol_out && !strcmp(pol_out, "u")
-            ? GON_OK
-            : gon_fail(err, GON_E_INPUT,
-                       "%s: measured behind an analyser (%s); only readings without one can be "
-                       "fitted so far",
-                       store_path(s), pol_out ? pol_out : "?");
-    free(pol_out);
-    return rc;
+    char *name = store_read_meta(s, "pol_out");
+    int state = name ? brdf_state_find(name) : -1;
+    free(name);
+    if (state < 0)
+        return gon_fail(err, GON_E_INPUT, "%s: the file does not say which analyser was used",
+                        store_path(s));
+    *ret_out = (enum brdf_state)state;
+    return GON_OK;
 }
 
 int dataset_from_store(struct store *s, const struct dataset_filter *filter,
@@ -257,14 +299,15 @@ int dataset_from_store(struct store *s, const struct dataset_filter *filter,
     struct dataset d = {0};
     struct plan plan = {0};
     struct reduction r = {0};
-    int rc = check_analyser(s, err);
+    enum brdf_state out = BRDF_STATE_U;
+    int rc = read_analyser(s, &out, err);
     if (rc >= 0)
         rc = store_read_plan(s, &plan, err);
     if (rc >= 0)
         rc = reduce_campaign(s, &r, err);
     snprintf(d.source, sizeof d.source, "%s", store_path(s));
     if (rc >= 0)
-        rc = take_points(&plan, &r, filter, &d, err);
+        rc = take_points(&plan, &r, out, filter, &d, err);
     if (rc >= 0)
         reduction_warning(&r, d.note, sizeof d.note);
     plan_clear(&plan);

@@ -3,12 +3,11 @@
 //
 // CSV: '#' lines are comments; the first other line names the columns. Needed: theta_i_deg;
 // theta_r_signed_deg (>= 0: forward, dphi = 180 deg) or theta_r_deg and dphi_deg; a value column,
-// f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in,
-// pol_out. Other columns are ignored. CRLF, a byte-order mark and rows that occur twice are fine.
-// Errors are "file:line:
-// ...", GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged
-// row, theta outside [0, 90), a value column that is all zero, u_f_r <= 0, pol_in or pol_out
-// other than u.
+// f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in and
+// pol_out (u, s, p, +45, -45, R, L: model/state.h; without the column all are u). Other columns are
+// ignored. CRLF, a byte-order mark and rows that occur twice are fine. Errors are "file:line: ...",
+// GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged row, theta
+// outside [0, 90), a value column that is all zero, u_f_r <= 0, another state of polarisation.
 #pragma once
 #include "base/err.h"
 #include "campaign/store.h"
@@ -31,6 +30,7 @@ struct dataset {
     size_t count;
     double *theta_i_rad, *theta_r_rad, *dphi_rad, *f_per_sr;
     double *u_per_sr; // NULL unless every row has one
+    unsigned char *pol_in, *pol_out; // enum brdf_state of each; NULL when all are u
     double u_scale;   // relative standard uncertainty common to all; 0 from a CSV
     size_t left_out;  // by the filter
     char source[512];

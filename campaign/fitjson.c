@@ -124,7 +124,7 @@ static json_t *warnings(const struct fit_record *f)
     const struct fit_result *r = &f->result;
     json_t *all = json_array();
     for (unsigned bit = 1; bit; bit <<= 1) {
-        char text[400];
+        char text[600];
         if ((r->warnings & bit) &&
             fit_warning_text(r, (enum fit_warning)bit, text, sizeof text) > 0)
             json_array_append_new(all, json_string(text));

@@ -255,17 +255,6 @@ static void warn_of_polarisation(struct maker *m)
     if (m->bench && c->pol_in == POL_IN_LASER && m->bench->laser.polarisation == POL_UNKNOWN)
         warn(m, "the laser's polarisation is unknown: what is measured is f_00 + m f_01 with "
                 "unknown m");
-    const int pol_in =
-        c->pol_in == POL_IN_LASER ? (m->bench ? m->bench->laser.polarisation : POL_U) : c->pol_in;
-    if (pol_in != POL_U && pol_in != POL_UNKNOWN)
-        warn(m,
-             "the light on the sample is polarised (\"%s\"): what is measured is f_00 + m f_01, "
-             "and the fit takes it "
-             "for f_00",
-             polarisation_name((enum polarisation)pol_in));
-    if (c->pol_out != POL_U)
-        warn(m, "pol_out = \"%s\": readings behind an analyser are stored but not fitted",
-             polarisation_name((enum polarisation)c->pol_out));
 }
 
 // --- time ----------------------------------------------------------------------------------------

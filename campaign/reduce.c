@@ -343,11 +343,9 @@ void reduction_clear(struct reduction *r)
 
 int reduction_warning(const struct reduction *r, char *text, size_t size)
 {
-    if (r->polarisation == POL_U)
-        return snprintf(text, size, "%s", "");
-    const char *name = polarisation_name((enum polarisation)r->polarisation);
-    return snprintf(
-        text, size,
-        "the laser's polarisation is %s%s: f_r is f_00 + m f_01, fitted as if it were f_00",
-        r->polarisation == POL_UNKNOWN ? "" : "not u but ", name);
+    return snprintf(text, size, "%s",
+                    r->polarisation == POL_UNKNOWN
+                        ? "the laser's polarisation is unknown: f_r is f_00 + m f_01 with unknown "
+                          "m, fitted as if it were f_00"
+                        : "");
 }

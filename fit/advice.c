@@ -145,6 +145,19 @@ static void channels_of(const struct fit_data *d, struct advice_plan *plan)
     }
 }
 
+// All channels of the candidate are in the data: it is FIT_MEASURE_AGAIN under another name.
+static bool measured_already(const struct candidate *c, const struct advice_plan *data)
+{
+    bool all = c->channels > 0;
+    for (int k = 0; k < c->channels; k++) {
+        bool found = false;
+        for (int i = 0; i < data->channels; i++)
+            found = found || (data->in[i] == c->in[k] && data->out[i] == c->out[k]);
+        all = all && found;
+    }
+    return all;
+}
+
 static double u_of_coordinate(int i, const double x[N], double variance)
 {
     double spread = sqrt(variance);
@@ -187,7 +200,7 @@ static void answer(const struct question *q, const double added[N][N], struct fi
 static bool consider(const struct question *q, enum fit_measurement what, struct fit_advice *a)
 {
     const struct candidate *candidate = &candidates[what];
-    struct advice_plan plan = {.channels = candidate->channels};
+    struct advice_plan plan;
     double added[N][N];
     *a = (struct fit_advice){.what = what};
     struct directions d = what == FIT_MEASURE_GRAZING ? grazing(q->data, a) : as_measured(q->data);
@@ -195,12 +208,14 @@ static bool consider(const struct question *q, enum fit_measurement what, struct
     plan.theta_i_rad = d.ti;
     plan.theta_r_rad = d.tr;
     plan.dphi_rad = d.dphi;
-    memcpy(plan.in, candidate->in, sizeof plan.in);
-    memcpy(plan.out, candidate->out, sizeof plan.out);
-    if (plan.channels == 0)
-        channels_of(q->data, &plan);
-    if (plan.count == 0)
+    channels_of(q->data, &plan);
+    if (plan.count == 0 || measured_already(candidate, &plan))
         return false;
+    if (candidate->channels > 0) {
+        plan.channels = candidate->channels;
+        memcpy(plan.in, candidate->in, sizeof plan.in);
+        memcpy(plan.out, candidate->out, sizeof plan.out);
+    }
     advice_information(&plan, q->x, q->options->diffuse, &q->noise, added);
     double effort = (double)q->data->count / (double)plan.count / plan.channels;
     for (int i = 0; i < N; i++)

@@ -112,7 +112,7 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
 {
     static const enum fit_param all[] = {FIT_N, FIT_K, FIT_SIGMA, FIT_KS, FIT_KD};
     static const enum fit_param optical[] = {FIT_N, FIT_K, FIT_KS};
-    char names[160];
+    char names[160], advice[200] = "";
     switch (w) {
     case FIT_WARN_DHR_ABOVE_ONE:
         return snprintf(
@@ -138,11 +138,13 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
             "apart reliably; measure more sweeps.");
     case FIT_WARN_NOT_IDENTIFIED:
         list(r, unidentified, optical, 3, names);
-        return snprintf(
-            text, size,
-            "f_00 alone does not separate n, k and ks (%s); use sigma = %.4g, kd = %.4g and "
-            "ks R(45 deg) = %.4g, or measure polarised or up to 80 deg.",
-            names, r->params.sigma, r->params.kd, r->ks_r45.value);
+        if (r->advice_count > 0)
+            fit_advice_text(r, 0, advice, sizeof advice);
+        return snprintf(text, size,
+                        "These readings do not separate n, k and ks (%s): use sigma = %.4g, kd = %.4g "
+                        "and ks R(45 deg) = %.4g%s%s.",
+                        names, r->params.sigma, r->params.kd, r->ks_r45.value,
+                        *advice ? ". What helps most: " : "", advice);
     case FIT_WARN_MODEL_ERROR: return model_error_text(r, text, size);
     }
     return snprintf(text, size, "unknown warning %u", (unsigned)w);

@@ -122,6 +122,28 @@ static void uncertainties_belong_to_their_column(void **state)
     dataset_clear(&d);
 }
 
+static void states_of_polarisation_are_read(void **state)
+{
+    (void)state;
+    struct dataset d = taken("theta_i_deg,pol_in,theta_r_signed_deg,f_r,pol_out\n1,u,2,3,u\n1,+45,2,3,"
+                             "-45\n1,\"R\",2,3,L\n1,s,2,3,p\n",
+                             NULL, NULL);
+    static const enum brdf_state in[] = {BRDF_STATE_U, BRDF_STATE_PLUS45, BRDF_STATE_R, BRDF_STATE_S},
+                                 out[] = {BRDF_STATE_U, BRDF_STATE_MINUS45, BRDF_STATE_L,
+                                          BRDF_STATE_P};
+    const struct fit_data f = dataset_fit_data(&d);
+    assert_int_equal(f.count, 4);
+    for (int i = 0; i < 4; i++)
+        assert_true(f.pol_in[i] == in[i] && f.pol_out[i] == out[i]);
+    dataset_clear(&d);
+    d = taken("theta_i_deg,pol_in,theta_r_signed_deg,f_r\n1,s,2,3\n", NULL, NULL);
+    assert_true(d.pol_in[0] == BRDF_STATE_S && d.pol_out[0] == BRDF_STATE_U);
+    dataset_clear(&d);
+    d = taken("theta_i_deg,pol_in,theta_r_signed_deg,f_r,pol_out\n1,u,2,3,u\n", NULL, NULL);
+    assert_true(!d.pol_in && !d.pol_out); // all unpolarised: nothing to tell
+    dataset_clear(&d);
+}
+
 static void filters_choose_sweeps(void **state)
 {
     (void)state;
@@ -136,6 +158,10 @@ static void filters_choose_sweeps(void **state)
     f.theta_i_deg[f.theta_i_count++] = 0;
     d = taken(text, NULL, &f);
     assert_true(d.count == 2 && d.f_per_sr[0] == 1 && d.f_per_sr[1] == 4);
+    dataset_clear(&d);
+    f.without_deg[f.without_count++] = 0;
+    d = taken(text, NULL, &f);
+    assert_true(d.count == 1 && d.left_out == 3 && d.f_per_sr[0] == 4);
     dataset_clear(&d);
     f.theta_i_deg[0] = f.theta_i_deg[1] = 12;
     struct gon_error err;
@@ -168,9 +194,12 @@ static void bad_fields_are_named_with_line_and_column(void **state)
             ":2: theta_r_deg = -2: out of range; allowed 0..90 (90 excluded) deg");
     refused("theta_i_deg,theta_r_signed_deg,f_r,u_f_r\n1,2,3,0\n", NULL,
             ":2: u_f_r = 0: a standard uncertainty is above zero");
-    refused("theta_i_deg,theta_r_signed_deg,f_r,pol_out\n1,2,3,u\n1,2,3,s\n", NULL,
-            ":3: pol_out = s: only unpolarised data (u) can be fitted so far; leave the other rows "
-            "out");
+    refused("theta_i_deg,theta_r_signed_deg,f_r,pol_out\n1,2,3,u\n1,2,3,45\n", NULL,
+            ":3: pol_out = 45: no state of polarisation; allowed u, s, p, +45, -45, R, L");
+    refused("theta_i_deg,theta_r_signed_deg,f_r,pol_in\n1,2,3,unpolarised\n", NULL,
+            ":2: pol_in = unpolarised: no state of polarisation; allowed u, s, p, +45, -45, R, L");
+    refused("theta_i_deg,theta_r_signed_deg,f_r,pol_in\n1,2,3,\n", NULL,
+            ":2: pol_in = : no state of polarisation; allowed u, s, p, +45, -45, R, L");
 }
 
 static void bad_files_are_refused(void **state)
@@ -360,29 +389,18 @@ static void a_campaign_becomes_a_data_set(void **state)
     fixture_remove(&folder);
 }
 
-static void an_analyser_is_not_fitted(void **state)
+static void a_campaign_tells_its_channel(void **state)
 {
     (void)state;
     const struct fixture_folder folder = fixture_folder();
     const struct dataset_filter f = dataset_filter_all();
-    struct store *s = measured(&folder, "pol_out = \"s\";");
-    struct dataset d;
-    struct gon_error err;
-    assert_int_equal(dataset_from_store(s, &f, &d, NULL, &err), GON_E_INPUT);
-    assert_non_null(strstr(err.text, "behind an analyser (s)"));
-    store_close(s, NULL);
-    fixture_remove(&folder);
-}
-
-static void polarised_light_is_said(void **state)
-{
-    (void)state;
-    const struct fixture_folder folder = fixture_folder();
-    const struct dataset_filter f = dataset_filter_all();
-    struct store *s = measured(&folder, "pol_in = \"s\";");
+    struct store *s = measured(&folder, "pol_in = \"s\"; pol_out = \"+45\";");
     struct dataset d;
     assert_int_equal(dataset_from_store(s, &f, &d, NULL, NULL), 0);
-    assert_non_null(strstr(d.note, "f_00 + m f_01"));
+    assert_true(d.pol_in && d.pol_out);
+    for (size_t i = 0; i < d.count; i++)
+        assert_true(d.pol_in[i] == BRDF_STATE_S && d.pol_out[i] == BRDF_STATE_PLUS45);
+    assert_string_equal(d.note, "");
     dataset_clear(&d);
     store_close(s, NULL);
     fixture_remove(&folder);
@@ -394,6 +412,7 @@ int main(void)
         cmocka_unit_test(signs_become_half_planes),
         cmocka_unit_test(what_other_programs_write_is_fine),
         cmocka_unit_test(uncertainties_belong_to_their_column),
+        cmocka_unit_test(states_of_polarisation_are_read),
         cmocka_unit_test(filters_choose_sweeps),
         cmocka_unit_test(bad_fields_are_named_with_line_and_column),
         cmocka_unit_test(bad_files_are_refused),
@@ -401,8 +420,7 @@ int main(void)
         cmocka_unit_test(large_files_take_their_time_linearly),
         cmocka_unit_test(measured_paints_are_read),
         cmocka_unit_test(a_campaign_becomes_a_data_set),
-        cmocka_unit_test(an_analyser_is_not_fitted),
-        cmocka_unit_test(polarised_light_is_said),
+        cmocka_unit_test(a_campaign_tells_its_channel),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }
