@@ -3,6 +3,7 @@
 #   make                 the three programs            make demo     a whole campaign on the simulated bench
 #   make check           unit and system tests         make layers   who may include whom
 #   make bench           what things cost, as a table and in build/bench.json
+#   make check-slow      statistics of the fit's intervals (minutes)
 #   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
 #
 # A variant is a compiler and its flags: release, clang, asan, debug. VARIANT=asan make check.
@@ -50,7 +51,7 @@ Q := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
 .DEFAULT_GOAL := all
-.PHONY: all bench check unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
+.PHONY: all bench check check-slow unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
 all: $(PROGRAMS:%=$(B)/%) $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
 
 # --- objects, one archive a layer, programs -------------------------------------------------------
@@ -102,6 +103,21 @@ $(B)/tests/$(1): $(B)/obj/tests/unit/$(1).o $(patsubst %,$(B)/lib%.a,$(call uses
 	$(Q)$(CC) $(LDFLAGS) -o $$@ $$^ -lcmocka $(call libs_of,$(call uses,$(1)))
 endef
 $(foreach t,$(UNIT_TESTS),$(eval $(call test_rules,$(t))))
+
+# tests/slow/check_<what>.c: statistics that take minutes; each prints its seeds, a table, and fails by status.
+SLOW_TESTS := $(patsubst tests/slow/%.c,%,$(wildcard tests/slow/check_*.c))
+slow_uses = $(shell sed -n 's,^// uses: *,,p' tests/slow/$(1).c)
+define slow_rules
+OBJECTS += $(B)/obj/tests/slow/$(1).o
+$(B)/tests/$(1): $(B)/obj/tests/slow/$(1).o $(patsubst %,$(B)/lib%.a,$(call slow_uses,$(1)))
+	$$(call say,LINK,$$@)
+	$(Q)mkdir -p $$(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $$@ $$^ $(call libs_of,$(call slow_uses,$(1)))
+endef
+$(foreach t,$(SLOW_TESTS),$(eval $(call slow_rules,$(t))))
+
+check-slow: $(SLOW_TESTS:%=$(B)/tests/%)
+	$(Q)set -e; for t in $^; do $$t; done
 
 SHIM := $(B)/tests/libptycompat.so
 $(SHIM): tests/shim/ptycompat.c

@@ -10,6 +10,7 @@
 #include <string.h>
 
 enum { STEPS = 3, ROUNDS = 8, QUANTITIES = FIT_PARAMS + 2 };
+#define Z95 1.959963984540054
 #define SETTLED 1e-3 // of the noise's variance: z of an estimate within 3 %
 
 struct work {
@@ -57,19 +58,26 @@ static bool refit(struct work *w, struct fit_optimum *at)
 }
 
 // A scale common to all readings is the same for all that is proportional to them.
-static void keep(struct work *w, int i, const struct fit_optimum *at, double scale)
+static void quantities(const struct fit_optimum *at, double scale, double ret[QUANTITIES])
 {
     struct brdf_params p = space_params(at->x);
     double ks = p.ks * scale;
-    const double v[QUANTITIES] = {p.n,
-                                  p.k,
-                                  p.sigma,
-                                  ks,
-                                  p.kd * scale,
-                                  ks * brdf_fresnel_mean(p.n, p.k, 0, 1),
-                                  ks * brdf_fresnel_mean(p.n, p.k, 0.5, 0.5)};
+    const double all[QUANTITIES] = {p.n,
+                                    p.k,
+                                    p.sigma,
+                                    ks,
+                                    p.kd * scale,
+                                    ks * brdf_fresnel_mean(p.n, p.k, 0, 1),
+                                    ks * brdf_fresnel_mean(p.n, p.k, 0.5, 0.5)};
+    memcpy(ret, all, sizeof all);
+}
+
+static void keep(struct work *w, int i, const struct fit_optimum *at, double scale)
+{
+    double of_replica[QUANTITIES];
+    quantities(at, scale, of_replica);
     for (int j = 0; j < QUANTITIES; j++)
-        w->values[j][i] = v[j];
+        w->values[j][i] = of_replica[j];
 }
 
 static bool run(struct work *w)
@@ -90,22 +98,44 @@ static bool run(struct work *w)
 // --- what they say
 // --------------------------------------------------------------------------------
 
-static struct fit_spread spread(double *values, int count)
+static double normal_below(double z)
 {
-    double mean = 0, square = 0;
-    for (int i = 0; i < count; i++)
+    return 0.5 * erfc(-z * 0.70710678118654752);
+}
+
+static double normal_quantile(double p)
+{
+    double low = -9, high = 9;
+    for (int i = 0; i < 60; i++) {
+        double middle = (low + high) / 2;
+        *(normal_below(middle) < p ? &low : &high) = middle;
+    }
+    return (low + high) / 2;
+}
+
+// Quantiles moved by twice the bias: by how often a replica falls below what it was made from.
+static struct fit_spread spread(double *values, int count, double estimate)
+{
+    double mean = 0, square = 0, below = 0.5;
+    for (int i = 0; i < count; i++) {
         mean += values[i] / count;
+        below += values[i] < estimate ? 1 : values[i] > estimate ? 0 : 0.5;
+    }
     for (int i = 0; i < count; i++)
         square += (values[i] - mean) * (values[i] - mean) / (count - 1);
-    return (struct fit_spread){sqrt(square), select_quantile(values, (size_t)count, 0.025),
-                               select_quantile(values, (size_t)count, 0.975)};
+    double shift = 2 * normal_quantile(below / (count + 1));
+    return (struct fit_spread){
+        sqrt(square), select_quantile(values, (size_t)count, normal_below(shift - Z95)),
+        select_quantile(values, (size_t)count, normal_below(shift + Z95))};
 }
 
 static void summarise(struct work *w, struct fit_bootstrap *ret)
 {
     struct fit_spread all[QUANTITIES];
+    double estimate[QUANTITIES];
+    quantities(w->best, 1, estimate);
     for (int j = 0; j < QUANTITIES && !control_ask(w->control); j++)
-        all[j] = spread(w->values[j], w->options->bootstrap);
+        all[j] = spread(w->values[j], w->options->bootstrap, estimate[j]);
     if (w->control->stop)
         return;
     memcpy(ret->param, all, sizeof ret->param);

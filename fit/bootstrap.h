@@ -9,6 +9,10 @@
 // 2 % noise does between the peak and the wings. Both hold noise only, nothing of what the model
 // cannot follow.
 //
+// Intervals are bias-corrected percentiles (Efron 1981): where half of the replicas fall elsewhere than
+// below the estimate, the 2.5 and 97.5 % quantiles are moved by twice that. Plain percentiles count a
+// bias twice and held the truth in 87 to 90 % of cases near k = 0.
+//
 // A replica's fit starts from the optimum. Its first step is the linearised one; it goes on while
 // three more steps still lower q by more than a thousandth of the noise's variance. Another valley
 // is not looked for. Replica i has its own generator, made from seed and i.

@@ -110,7 +110,7 @@ struct fit_derived {
 };
 
 struct fit_spread {
-    double u, lo95, hi95; // standard deviation, 2.5 % and 97.5 % quantiles of the replicas
+    double u, lo95, hi95; // standard deviation and bias-corrected percentiles of the replicas
 };
 
 // Noise, and u_scale where it applies. NAN throughout when replicas is 0.

@@ -3,6 +3,8 @@
 #include "fit/covariance.h"
 #include "fit/eigen.h"
 #include "fit/fit.h"
+#include "fit/set.h"
+#include "fit/space.h"
 #include "tests/unit/readings.h"
 
 #include <setjmp.h>
@@ -121,6 +123,40 @@ static void u_is_the_spread_of_repeated_fits_whatever_the_weights(void **state)
         if (!(u[j] > 0.78 * spread && u[j] < 1.39 * spread))
             fail_msg("quantity %d: mean u %g, spread %g", j, u[j], spread);
     }
+    readings_free(&r);
+}
+
+// Under uniform weights the plain covariance q/dof H^-1, which is right when all readings are equally
+// noisy, is far from what happens; the sandwich is not. 100 sets: 4 sigma of a spread is 28 %.
+static void the_plain_covariance_is_wrong_where_the_sandwich_is_right(void **state)
+{
+    (void)state;
+    struct readings r = readings_paper();
+    double sum = 0, sum2 = 0, plain = 0, sandwich = 0, sets = 100;
+    for (int i = 0; i < 100; i++) {
+        struct fit_options o = fit_options_default();
+        struct fit_control control = {.canceled = NULL};
+        struct fit_space space = space_of_options(&o);
+        struct fit_set set;
+        struct covariance cov;
+        double x[FIT_PARAMS];
+        readings_measure(&r, &truth[1], 0.02, 1e-5, 5000 + (uint64_t)i);
+        struct fit_result f = fit(&r, &o, false);
+        struct fit_data data = readings_data(&r, false);
+        assert_int_equal(set_compile(&data, &o, &control, &set), 0);
+        space_of_params(&f.params, x);
+        assert_true(covariance_at(&set, &space, x, &control, &cov));
+        double s2 = f.delta * set.ff / cov.dof;
+        plain += f.params.sigma * sqrt(s2 * cov.inverse[FIT_SIGMA][FIT_SIGMA]) / sets;
+        sandwich += f.estimate[FIT_SIGMA].u / sets;
+        sum += f.params.sigma / sets;
+        sum2 += f.params.sigma * f.params.sigma / sets;
+        set_free(&set);
+    }
+    double spread = sqrt(sum2 - sum * sum);
+    print_message("sigma: spread %.2g, sandwich %.2g, plain %.2g\n", spread, sandwich, plain);
+    assert_true(sandwich > 0.78 * spread && sandwich < 1.39 * spread);
+    assert_true(plain < 0.7 * spread);
     readings_free(&r);
 }
 
@@ -294,6 +330,7 @@ int main(void)
         cmocka_unit_test(eigenvalues_of_a_known_matrix),
         cmocka_unit_test(intervals_cover_the_truth_as_often_as_they_say),
         cmocka_unit_test(u_is_the_spread_of_repeated_fits_whatever_the_weights),
+        cmocka_unit_test(the_plain_covariance_is_wrong_where_the_sandwich_is_right),
         cmocka_unit_test(u_is_that_of_linear_theory_for_variance_weights),
         cmocka_unit_test(intervals_of_n_k_and_ks_agree_along_the_valley),
         cmocka_unit_test(common_scale_goes_into_ks_kd_and_what_derives_from_them),
