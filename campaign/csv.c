@@ -147,6 +147,12 @@ static int header(struct csv *c, struct gon_error *err)
     if (n > MOST_COLUMNS)
         return gon_fail(err, GON_E_INPUT, "%s:%ld: %d columns; at most %d", c->name, c->line, n,
                         MOST_COLUMNS);
+    const char *cr = memchr(from, '\r', (size_t)(to - from));
+    if (cr)
+        return gon_fail(
+            err, GON_E_INPUT,
+            "%s:%ld: a line ends with a carriage return alone; end lines with LF or CRLF", c->name,
+            c->line);
     if (n == 1 &&
         (memchr(from, ';', (size_t)(to - from)) || memchr(from, '\t', (size_t)(to - from))))
         return gon_fail(
@@ -232,6 +238,33 @@ long csv_line(const struct csv *c)
 
 // --- columns -------------------------------------------------------------------------------------
 
+// At most `most` bytes of a file's text for a message: what a terminal would obey becomes '?', in
+// ASCII and in UTF-8 (U+0080 to U+009F); so does what is left of a character that was cut.
+static const char *shown(struct csv_field f, size_t most, char text[128])
+{
+    size_t used = 0;
+    bool cut = f.size > most;
+    for (size_t i = 0; i < f.size && i < most && used < 120; i++) {
+        unsigned char c = (unsigned char)f.text[i],
+                      next = i + 1 < f.size ? (unsigned char)f.text[i + 1] : 0;
+        bool stray = c >= 0x80 && c < 0xc0 && (i == 0 || (unsigned char)f.text[i - 1] < 0x80);
+        bool control = c < 0x20 || c == 0x7f || (c == 0xc2 && next >= 0x80 && next < 0xa0) || stray;
+        text[used++] = control ? '?' : (char)c;
+        i += c == 0xc2 && control;
+    }
+    while (cut && used > 0 && ((unsigned char)text[used - 1] & 0xc0) == 0x80)
+        used--;
+    if (cut && used > 0 && (unsigned char)text[used - 1] >= 0xc0)
+        used--;
+    strcpy(text + used, cut ? "..." : "");
+    return text;
+}
+
+static const char *shown_name(const char *name, size_t most, char text[128])
+{
+    return shown((struct csv_field){name, strlen(name)}, most, text);
+}
+
 int csv_column(const struct csv *c, const char *name)
 {
     int found = -1;
@@ -243,18 +276,19 @@ int csv_column(const struct csv *c, const char *name)
 
 int csv_no_column(const struct csv *c, const char *name, struct gon_error *err)
 {
-    char all[300] = "";
+    char all[300] = "", text[128];
     if (csv_column(c, name) == -2)
         return gon_fail(err, GON_E_INPUT, "%s:%ld: column '%s' is there twice", c->name,
                         c->header_line, name);
     const char *meant = options_suggest(name, (const char *const *)c->columns);
+    if (meant)
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; did you mean '%s'?", c->name,
+                        c->header_line, name, shown_name(meant, 60, text));
     for (int i = 0; i < c->count; i++) {
         size_t used = strlen(all);
-        snprintf(all + used, sizeof all - used, "%s%.40s", i ? ", " : "", c->columns[i]);
+        snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "",
+                 shown_name(c->columns[i], 40, text));
     }
-    if (meant)
-        return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; did you mean '%.60s'?", c->name,
-                        c->header_line, name, meant);
     return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; there are %s", c->name,
                     c->header_line, name, all);
 }
@@ -283,9 +317,9 @@ int csv_fail(const struct csv *c, int column, struct gon_error *err, const char 
     va_start(args, fmt);
     vsnprintf(text, sizeof text, fmt, args);
     va_end(args);
-    return gon_fail(err, GON_E_INPUT, "%s:%ld: %.60s = %.*s%s: %s", c->name, c->line,
-                    c->columns[column], f.size > 40 ? 40 : (int)f.size, f.text,
-                    f.size > 40 ? "..." : "", text);
+    char name[128], value[128];
+    return gon_fail(err, GON_E_INPUT, "%s:%ld: %s = %s: %s", c->name, c->line,
+                    shown_name(c->columns[column], 60, name), shown(f, 40, value), text);
 }
 
 static bool digit(char c)

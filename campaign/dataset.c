@@ -60,8 +60,7 @@ struct fit_data dataset_fit_data(const struct dataset *d)
                              .pol_out = d->pol_out};
 }
 
-// --- one row at a time
-// -------------------------------------------------------------------------------
+// --- one row at a time ---------------------------------------------------------------------------
 
 struct row {
     struct direction direction;
@@ -134,21 +133,28 @@ static int finish(struct dataset *d, const char *column, struct gon_error *err)
     return GON_OK;
 }
 
-// --- CSV
-// ---------------------------------------------------------------------------------------------
+// --- CSV -----------------------------------------------------------------------------------------
 
 struct columns {
     struct direction_columns direction;
     int value, u, pol_in, pol_out; // -1: not there
 };
 
+// -1 where there is none.
+static int optional(const struct csv *c, const char *name, int *ret_column, struct gon_error *err)
+{
+    *ret_column = csv_column(c, name);
+    return *ret_column == -2 ? csv_no_column(c, name, err) : GON_OK;
+}
+
 // u_NAME belongs to column NAME; u_f_r also to another column when there is no f_r.
-static int find_u(const struct csv *c, const char *column)
+static int find_u(const struct csv *c, const char *column, int *ret_u, struct gon_error *err)
 {
     char name[200];
     snprintf(name, sizeof name, "u_%s", column);
-    int u = csv_column(c, name);
-    return u == -1 && csv_column(c, "f_r") == -1 ? csv_column(c, "u_f_r") : u;
+    int rc = optional(c, name, ret_u, err);
+    return rc >= 0 && *ret_u == -1 && csv_column(c, "f_r") == -1 ? optional(c, "u_f_r", ret_u, err)
+                                                                 : rc;
 }
 
 static int find_columns(const struct csv *c, const char *column, struct columns *k,
@@ -157,10 +163,11 @@ static int find_columns(const struct csv *c, const char *column, struct columns 
     int rc = direction_find(c, &k->direction, err);
     if (rc >= 0)
         rc = csv_need(c, column, &k->value, err);
-    k->u = find_u(c, column);
-    k->pol_in = csv_column(c, "pol_in");
-    k->pol_out = csv_column(c, "pol_out");
-    return rc;
+    if (rc >= 0)
+        rc = find_u(c, column, &k->u, err);
+    if (rc >= 0)
+        rc = optional(c, "pol_in", &k->pol_in, err);
+    return rc >= 0 ? optional(c, "pol_out", &k->pol_out, err) : rc;
 }
 
 static int take_state(const struct csv *c, int column, enum brdf_state *ret_state,
@@ -238,8 +245,7 @@ int dataset_from_csv(const char *path, const char *column, const struct dataset_
     return rc;
 }
 
-// --- campaign files
-// ----------------------------------------------------------------------------------
+// --- campaign files ------------------------------------------------------------------------------
 
 // The encoder may say -0.0003 deg for 0: the same geometry with both signs turned round.
 static struct row row_of(const struct reduced_point *p, enum brdf_state in, enum brdf_state out)

@@ -259,6 +259,9 @@ static int validate(const struct options *o, const char *file, struct fit_record
     filter.theta_i_max_deg = 90;
     memcpy(record->hold_out.theta_i_deg, filter.theta_i_deg, sizeof filter.theta_i_deg);
     int rc = load_file(o, file, &filter, &data, &ignored, &campaign, err);
+    if (rc == GON_E_INPUT) // the rest of the file has been read before
+        rc = gon_fail(err, GON_E_INPUT, "--hold-out %s: %s has no sweep at %s", o->hold_out, file,
+                      count == 1 ? "that theta_i" : "any of these theta_i");
     rc = rc < 0 ? rc : check_held_out(&data, &record->hold_out, err);
     if (rc == GON_OK) {
         struct fit_data d = dataset_fit_data(&data);

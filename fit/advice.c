@@ -18,8 +18,7 @@ static size_t stride_of(size_t count, size_t most)
     return (count + most - 1) / most;
 }
 
-// --- information
-// ----------------------------------------------------------------------------------
+// --- information ---------------------------------------------------------------------------------
 
 void advice_information(const struct advice_plan *plan, const double x[N],
                         enum brdf_diffuse diffuse, const struct noise *noise,
@@ -41,8 +40,7 @@ void advice_information(const struct advice_plan *plan, const double x[N],
     }
 }
 
-// --- candidates
-// -----------------------------------------------------------------------------------
+// --- candidates ----------------------------------------------------------------------------------
 
 struct directions {
     size_t count;

@@ -25,8 +25,7 @@ struct work {
     double *values[QUANTITIES];
 };
 
-// --- one replica
-// ----------------------------------------------------------------------------------
+// --- one replica ---------------------------------------------------------------------------------
 
 static bool draw(struct work *w, struct rng *rng)
 {
@@ -95,8 +94,7 @@ static bool run(struct work *w)
     return true;
 }
 
-// --- what they say
-// --------------------------------------------------------------------------------
+// --- what they say -------------------------------------------------------------------------------
 
 static double normal_below(double z)
 {

@@ -144,6 +144,7 @@ enum fit_warning {
     FIT_WARN_AT_BOUND = 1 << 2,
     FIT_WARN_FEW_SWEEPS = 1 << 3,     // fewer than 3 different theta_i
     FIT_WARN_NOT_IDENTIFIED = 1 << 4, // f_00 alone does not separate n, k and ks
+    FIT_WARN_SCALE = 1 << 6,      // the largest reading is below 1e-60 or above 1e30 sr^-1
     FIT_WARN_MODEL_ERROR = 1 << 5 // residuals larger (chi2, with u_per_sr) or smoother than noise
 };
 
@@ -163,6 +164,7 @@ struct fit_result {
     size_t advice_readings;                     // that each but FIT_MEASURE_NOTHING would add
     double residual_lag1; // autocorrelation of neighbouring residuals within a sweep, each divided by
                           // its noise, at the fit with weights 1/noise^2; NAN: none
+    double largest_per_sr; // reading, without its sign
     unsigned warnings;      // of fit_warning
     long evaluations;       // of the whole data set
     double elapsed_ms;       // search and polish

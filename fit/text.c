@@ -5,15 +5,20 @@
 #include <math.h>
 #include <stdio.h>
 
+#define LEAST_GAIN 0.05 // of advice worth a sentence
+
 const char *fit_stop_text(int stop)
 {
     switch (stop) {
     case FIT_OK: return "fitted";
     case FIT_E_FEW_POINTS: return "fewer than 5 readings: five parameters need at least as many";
     case FIT_E_ALL_ZERO:
-        return "every reading is zero: eq. 17 has no denominator; is this the right column?";
+        return "every reading is zero, or so small that its square is: eq. 17 has no denominator; "
+               "is "
+               "this the right column, in sr^-1?";
     case FIT_E_DATA:
-        return "a reading that is no finite number, an angle outside [0, 90) deg, an uncertainty "
+        return "a reading that is no finite number or beyond 1e100, an angle outside [0, 90) deg, "
+               "an uncertainty "
                "that is not above zero, or a zero reading under relative weights";
     case FIT_E_OPTIONS:
         return "options out of range: bounds need 0 < lower <= upper, variance weights need an "
@@ -98,6 +103,10 @@ int fit_advice_text(const struct fit_result *r, int which, char *text, size_t si
 static int model_error_text(const struct fit_result *r, char *text, size_t size)
 {
     static const char advice[] = "the intervals hold noise only, not what the model cannot follow";
+    if (isnan(r->residual_lag1))
+        return snprintf(text, size,
+                        "Residuals are larger than noise (chi2 per degree of freedom %.3g): %s.",
+                        r->chi2_per_dof, advice);
     if (isnan(r->chi2_per_dof))
         return snprintf(text, size,
                         "Residuals are smoother than noise (neighbours correlate by %.2f): %s.",
@@ -138,13 +147,20 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
             "apart reliably; measure more sweeps.");
     case FIT_WARN_NOT_IDENTIFIED:
         list(r, unidentified, optical, 3, names);
-        if (r->advice_count > 0)
+        if (r->advice_count > 0 && r->advice[0].gain > LEAST_GAIN)
             fit_advice_text(r, 0, advice, sizeof advice);
-        return snprintf(text, size,
-                        "These readings do not separate n, k and ks (%s): use sigma = %.4g, kd = %.4g "
-                        "and ks R(45 deg) = %.4g%s%s.",
-                        names, r->params.sigma, r->params.kd, r->ks_r45.value,
-                        *advice ? ". What helps most: " : "", advice);
+        return snprintf(
+            text, size,
+            "These readings do not separate n, k and ks (%s): use sigma = %.4g, kd = %.4g "
+            "and ks R(45 deg) = %.4g%s%s.",
+            names, r->params.sigma, r->params.kd, r->ks_r45.value,
+            *advice ? ". What helps most: " : "", advice);
+    case FIT_WARN_SCALE:
+        return snprintf(
+            text, size,
+            "The largest reading is %.3g sr^-1, which no surface has: squares of such numbers "
+            "leave the range of arithmetic and nothing can be identified; is the unit right?",
+            r->largest_per_sr);
     case FIT_WARN_MODEL_ERROR: return model_error_text(r, text, size);
     }
     return snprintf(text, size, "unknown warning %u", (unsigned)w);

@@ -14,7 +14,9 @@
 
 #define PI 3.14159265358979323846
 #define Z95 1.959963984540054
-#define ON_BOUND 1e-6 // of the bounds' distance
+#define ON_BOUND 1e-6       // of the bounds' distance
+#define LEAST_READING 1e-60 // fourth powers of readings stay in the range of doubles
+#define MOST_READING 1e30
 
 static double *param_of(struct brdf_params *p, int i)
 {
@@ -138,6 +140,14 @@ static void fill_estimates(const struct fit_options *o, const struct covariance 
     }
 }
 
+static double largest(const struct fit_data *d)
+{
+    double most = 0;
+    for (size_t i = 0; i < d->count; i++)
+        most = fmax(most, fabs(d->f_per_sr[i]));
+    return most;
+}
+
 static void fill_warnings(const struct fit_options *o, const struct residuals *res, double dof,
                           struct fit_result *r)
 {
@@ -153,6 +163,8 @@ static void fill_warnings(const struct fit_options *o, const struct residuals *r
         if (!held && !r->estimate[i].identified && (i == FIT_N || i == FIT_K || i == FIT_KS))
             r->warnings |= FIT_WARN_NOT_IDENTIFIED;
     }
+    if (!(r->largest_per_sr >= LEAST_READING && r->largest_per_sr <= MOST_READING))
+        r->warnings |= FIT_WARN_SCALE;
     if (res->sweeps < 3)
         r->warnings |= FIT_WARN_FEW_SWEEPS;
     // Chance does these once in 10,000, in 1000 and in 1,000,000 fits.
@@ -222,6 +234,7 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
         return FIT_E_CANCELED;
     r.chi2_per_dof = cov.dof >= 1 ? res.chi2 / cov.dof : (double)NAN;
     r.residual_lag1 = res.lag1;
+    r.largest_per_sr = largest(data);
     fill_warnings(options, &res, cov.dof, &r);
     *ret_result = r;
     return 0;

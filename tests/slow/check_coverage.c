@@ -75,8 +75,7 @@ static int measure(int mode, int truth, uint64_t seed)
     return stop;
 }
 
-// --- what chance does
-// -----------------------------------------------------------------------------
+// --- what chance does ----------------------------------------------------------------------------
 
 // That fewer than low or more than high of n intervals hold a truth that each holds with 95 %.
 static double outside(int n, int low, int high)

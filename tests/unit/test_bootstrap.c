@@ -152,8 +152,7 @@ static void none_or_too_few_say_nothing(void **state)
     readings_free(&r);
 }
 
-// --- cancelling
-// -----------------------------------------------------------------------------------
+// --- cancelling ----------------------------------------------------------------------------------
 
 struct deadline {
     struct timespec asked;

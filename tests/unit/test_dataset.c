@@ -125,10 +125,12 @@ static void uncertainties_belong_to_their_column(void **state)
 static void states_of_polarisation_are_read(void **state)
 {
     (void)state;
-    struct dataset d = taken("theta_i_deg,pol_in,theta_r_signed_deg,f_r,pol_out\n1,u,2,3,u\n1,+45,2,3,"
-                             "-45\n1,\"R\",2,3,L\n1,s,2,3,p\n",
-                             NULL, NULL);
-    static const enum brdf_state in[] = {BRDF_STATE_U, BRDF_STATE_PLUS45, BRDF_STATE_R, BRDF_STATE_S},
+    struct dataset d =
+        taken("theta_i_deg,pol_in,theta_r_signed_deg,f_r,pol_out\n1,u,2,3,u\n1,+45,2,3,"
+              "-45\n1,\"R\",2,3,L\n1,s,2,3,p\n",
+              NULL, NULL);
+    static const enum brdf_state in[] = {BRDF_STATE_U, BRDF_STATE_PLUS45, BRDF_STATE_R,
+                                         BRDF_STATE_S},
                                  out[] = {BRDF_STATE_U, BRDF_STATE_MINUS45, BRDF_STATE_L,
                                           BRDF_STATE_P};
     const struct fit_data f = dataset_fit_data(&d);
@@ -215,6 +217,12 @@ static void bad_files_are_refused(void **state)
             ":1: no column 'dphi_deg'; there are theta_i_deg, theta_r_deg, f_r");
     refused("theta_i_deg,theta_r_signed_deg,f_r,f_r\n1,2,3,4\n", NULL,
             ":1: column 'f_r' is there twice");
+    refused("theta_i_deg,theta_r_signed_deg,f_r,pol_in,pol_in\n1,2,3,s,s\n", NULL,
+            ":1: column 'pol_in' is there twice"); // not taken for unpolarised
+    refused("theta_i_deg,theta_r_signed_deg,f_r,u_f_r,u_f_r\n1,2,3,1,1\n", NULL,
+            ":1: column 'u_f_r' is there twice");
+    refused("theta_i_deg,theta_r_signed_deg,f_r\r1,2,3\r", NULL,
+            ":1: a line ends with a carriage return alone; end lines with LF or CRLF");
     refused(HEAD "1,2,0\n1,3,-0.0\n", NULL, ": f_r is zero in all 2 rows");
     refused(HEAD, NULL, ": no data");
     refused("", NULL, ":1: empty; the first line must name the columns");
@@ -232,6 +240,23 @@ static void bad_files_are_refused(void **state)
     close(fd);
     assert_int_equal(dataset_from_csv(path, NULL, &all, &d, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "zero byte"));
+}
+
+// A file's text must not reach a terminal as commands: escape sequences, bells, C1 controls in
+// UTF-8.
+static void control_characters_are_not_repeated(void **state)
+{
+    (void)state;
+    refused("theta_i_deg,theta_r_signed_deg,\x1b[31mred\x07\n1,2,3\n", NULL,
+            ":1: no column 'f_r'; there are theta_i_deg, theta_r_signed_deg, ?[31mred?");
+    refused("theta_i_deg,theta_r_signed_deg,f\xc2\x9b"
+            "31m\xc3\xa9\n1,2,3\n",
+            "v", ":1: no column 'v'; there are theta_i_deg, theta_r_signed_deg, f?31m\xc3\xa9");
+    refused(HEAD "1,2,\x1b]0;title\x07\n", NULL, ":2: f_r = ?]0;title?: not a number");
+    refused("theta_i_deg,theta_r_signed_deg,f_r,pol_in\n1,2,3,\x1b[2J\n", NULL,
+            ":2: pol_in = ?[2J: no state of polarisation; allowed u, s, p, +45, -45, R, L");
+    refused(HEAD "1,2,123456789012345678901234567890123456789\xc3\xa9 and more\n", NULL,
+            ":2: f_r = 123456789012345678901234567890123456789...: not a number");
 }
 
 // Every number as strtod reads it, to the bit: short and long ones, edges of the fast way.
@@ -320,8 +345,7 @@ static void measured_paints_are_read(void **state)
     dataset_clear(&d);
 }
 
-// --- campaign files
-// ----------------------------------------------------------------------------------
+// --- campaign files ------------------------------------------------------------------------------
 
 #define CAMPAIGN                                                                                   \
     "campaign: { name = \"a\"; theta_i_deg = (0, 30, 60); theta_r: { from_deg = -60; to_deg = "    \
@@ -416,6 +440,7 @@ int main(void)
         cmocka_unit_test(filters_choose_sweeps),
         cmocka_unit_test(bad_fields_are_named_with_line_and_column),
         cmocka_unit_test(bad_files_are_refused),
+        cmocka_unit_test(control_characters_are_not_repeated),
         cmocka_unit_test(numbers_are_rounded_as_strtod_does),
         cmocka_unit_test(large_files_take_their_time_linearly),
         cmocka_unit_test(measured_paints_are_read),
