@@ -9,9 +9,13 @@
 // 2 % noise does between the peak and the wings. Both hold noise only, nothing of what the model
 // cannot follow.
 //
-// Intervals are bias-corrected percentiles (Efron 1981): where half of the replicas fall elsewhere than
-// below the estimate, the 2.5 and 97.5 % quantiles are moved by twice that. Plain percentiles count a
-// bias twice and held the truth in 87 to 90 % of cases near k = 0.
+// Intervals are bias-corrected percentiles (Efron 1981): where half of the replicas fall elsewhere
+// than below the estimate, the 2.5 and 97.5 % quantiles are moved by twice that. Plain percentiles
+// count a bias twice and held the truth in 87 to 90 % of cases near k = 0.
+//
+// On a bound no bootstrap is right (Andrews 2000): half of the replicas sit there too, and what
+// correlates with the bounded parameter spreads some 10 % less than it should. fit_estimate.u does
+// not.
 //
 // A replica's fit starts from the optimum. Its first step is the linearised one; it goes on while
 // three more steps still lower q by more than a thousandth of the noise's variance. Another valley

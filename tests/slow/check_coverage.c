@@ -6,9 +6,12 @@
 //
 //   check_coverage [-s SEED] [-n SEEDS]
 //
-// Judged are sigma, kd, ks R(0) and ks R(45) by value +- 1.96 u: 90..99 % for each truth, 92..98 %
-// over all five. Profile intervals, bootstrap percentiles and uniform weights with u: 89..99.4 %
-// and 92..98 %.
+// Promised are sigma, kd, ks R(0) and ks R(45) by value +- 1.96 u: 90..99 % for each truth, 92..98
+// % over all five. Profile intervals, and uniform weights with u: 89..99.4 % and 92..98 %.
+// Bootstrap percentiles promise less and are guarded only against breaking, 86..99.4 % and 90..98
+// %: where k or n sits on its bound, half of the replicas do so too, and the replicas of what
+// correlates with it spread 10 % less than estimates do (Andrews 2000: no bootstrap is right on a
+// bound). More steps a replica change nothing.
 #include "fit/fit.h"
 #include "tests/unit/readings.h"
 
@@ -106,15 +109,15 @@ static void judge(int count, int n, double low_percent, double high_percent, str
 static void row(int mode, int kind, int q, int seeds, struct verdict *v)
 {
     const int *of = covered[mode][kind][q];
-    bool promised = kind == BY_U && mode < 2;
+    bool promised = kind == BY_U && mode < 2, guarded = kind == BY_BOOTSTRAP;
     int sum = 0;
     printf("%-15s %-10s %-9s", mode_name[mode], kind_name[kind], quantity_name[q]);
     for (int t = 0; t < TRUTHS; t++) {
-        judge(of[t], seeds, promised ? 90 : 89, promised ? 99 : 99.4, v);
+        judge(of[t], seeds, promised ? 90 : guarded ? 86 : 89, promised ? 99 : 99.4, v);
         sum += of[t];
     }
     printf("   |");
-    judge(sum, TRUTHS * seeds, 92, 98, v);
+    judge(sum, TRUTHS * seeds, guarded ? 90 : 92, 98, v);
     printf("\n");
 }
 
