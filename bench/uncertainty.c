@@ -1,125 +1,142 @@
 // SPDX-License-Identifier: MIT
 // uses: fit model
 // What knowing costs at the paper's plan (850 readings, one thread): covariance, five profiles,
-// bootstrap. One JSON object a line: name, value, unit. The least of many rounds, the kinds
-// interleaved, so that what else the machine does hurts all alike.
+// bootstrap, for three surfaces and two weightings.
+#include "bench/report.h"
 #include "fit/bootstrap.h"
 #include "fit/covariance.h"
 #include "fit/fit.h"
 #include "fit/polish.h"
 #include "fit/profile.h"
-#include "tests/unit/readings.h"
+#include "fit/rng.h"
 
-#include <stdio.h>
-#include <time.h>
+#include <math.h>
 
-enum { ROUNDS = 15, REPEATS = 200, REPLICAS = 1000, TRUTHS = 3 };
+enum { ROUNDS = 15, REPEATS = 200, REPLICAS = 1000, SWEEPS = 10, A_SWEEP = 85 };
+enum { READINGS = SWEEPS * A_SWEEP };
+#define RAD (3.14159265358979323846 / 180)
 
-static double now_us(void)
+static const struct {
+    const char *name;
+    struct brdf_params p;
+} truths[] = {{"dielectric", {1.5, 0.02, 0.15, 0.9, 0.05}},
+              {"metal", {1.3, 7.5, 0.12, 1, 0.01}},
+              {"paper's values", {5.345064, 5.345064, 0.123451, 0.95, 0.092414}}};
+
+struct readings {
+    double theta_i[READINGS], theta_r[READINGS], dphi[READINGS], f[READINGS], u[READINGS];
+};
+
+// The paper's ten sweeps, 85 readings each, 2 % noise and a floor of 1e-5 sr^-1.
+static void measure(const struct brdf_params *p, struct readings *r)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
-}
-
-static void say(const char *name, const char *truth, double value, const char *unit)
-{
-    printf("{\"name\": \"%s, %s\", \"value\": %.4g, \"unit\": \"%s\"}\n", name, truth, value, unit);
+    static const double sweep_deg[SWEEPS] = {0, 5, 10, 20, 30, 40, 45, 50, 55, 60};
+    struct rng rng;
+    rng_seed(&rng, 7);
+    for (int i = 0; i < READINGS; i++) {
+        double theta_r_deg = -83.7 + 2 * (i % A_SWEEP);
+        r->theta_i[i] = sweep_deg[i / A_SWEEP] * RAD;
+        r->theta_r[i] = fabs(theta_r_deg) * RAD;
+        r->dphi[i] = theta_r_deg < 0 ? 0 : 180 * RAD;
+        struct brdf_geometry g = brdf_geometry(r->theta_i[i], r->theta_r[i], r->dphi[i]);
+        double f = brdf_f00(p, BRDF_DIFFUSE_PAPER, &g);
+        r->u[i] = hypot(0.02 * f, 1e-5);
+        r->f[i] = f + r->u[i] * rng_normal(&rng);
+    }
 }
 
 struct work {
     struct fit_set set;
+    struct fit_options options;
     struct fit_space space;
     struct fit_optimum best;
     struct covariance cov;
-    struct fit_options options;
+    struct fit_control control;
 };
 
-static double covariance_us(struct work *w)
+static double covariance_ns(struct work *w)
 {
-    struct fit_control control = {.canceled = NULL};
-    double start = now_us();
+    double start = report_now_ns();
     for (int i = 0; i < REPEATS; i++)
-        covariance_at(&w->set, &w->space, w->best.x, &control, &w->cov);
-    return (now_us() - start) / REPEATS;
+        covariance_at(&w->set, &w->space, w->best.x, &w->control, &w->cov);
+    return (report_now_ns() - start) / REPEATS;
 }
 
-static double profiles_us(struct work *w)
+static double profiles_ns(struct work *w)
 {
-    struct fit_control control = {.canceled = NULL};
     struct fit_optimum best = w->best;
     struct profile profile[FIT_PARAMS];
     bool better;
-    double start = now_us();
-    profile_intervals(&w->set, &w->space, &w->cov, &control, &best, profile, &better);
-    return now_us() - start;
+    double start = report_now_ns();
+    profile_intervals(&w->set, &w->space, &w->cov, &w->control, &best, profile, &better);
+    return report_now_ns() - start;
 }
 
-static double bootstrap_us(struct work *w)
+static double bootstrap_ns(struct work *w)
 {
-    struct fit_control control = {.canceled = NULL};
     struct fit_bootstrap result;
-    double start = now_us();
-    bootstrap_run(&w->set, &w->options, &w->best, &w->cov, &control, &result);
-    return now_us() - start;
+    double start = report_now_ns();
+    bootstrap_run(&w->set, &w->options, &w->best, &w->cov, &w->control, &result);
+    return report_now_ns() - start;
 }
 
-// The paper's ten sweeps with 85 readings each.
-static struct readings plan(void)
+static int prepare(const struct fit_data *data, struct work *w)
 {
-    static const double sweep[] = {0, 5, 10, 20, 30, 40, 45, 50, 55, 60};
-    struct readings r = readings_new(850);
-    for (int s = 0; s < 10; s++)
-        for (int i = 0; i < 85; i++)
-            readings_add(&r, sweep[s], -83.7 + 2 * i, 0);
-    return r;
-}
-
-static void measure(const char *name, const struct brdf_params *truth, bool with_u)
-{
-    struct readings r = plan();
-    readings_measure(&r, truth, 0.02, 1e-5, 7);
-    struct fit_data data = readings_data(&r, with_u);
-    struct fit_options o = fit_options_default();
-    o.weighting = with_u ? FIT_VARIANCE : FIT_UNIFORM;
-    struct fit_control control = {.canceled = NULL};
     struct fit_result result;
-    struct work w;
-    if (fit_run(&data, &o, &result) || set_compile(&data, &o, &control, &w.set))
-        return;
-    w.options = o;
-    w.options.bootstrap = REPLICAS;
-    w.space = space_of_options(&o);
-    space_of_params(&result.params, w.best.x);
-    polish(&w.set, &w.space, 100, &control, &w.best);
-    double least[3] = {1e300, 1e300, 1e300};
-    for (int round = 0; round < ROUNDS; round++) {
-        double us[3] = {covariance_us(&w), profiles_us(&w), bootstrap_us(&w)};
-        for (int i = 0; i < 3; i++)
-            least[i] = us[i] < least[i] ? us[i] : least[i];
+    w->options = fit_options_default();
+    w->options.weighting = data->u_per_sr ? FIT_VARIANCE : FIT_UNIFORM;
+    w->options.bootstrap = REPLICAS;
+    w->space = space_of_options(&w->options);
+    int stop = fit_run(data, &w->options, &result);
+    stop = stop ? stop : set_compile(data, &w->options, &w->control, &w->set);
+    if (stop)
+        return stop;
+    space_of_params(&result.params, w->best.x);
+    polish(&w->set, &w->space, 100, &w->control, &w->best);
+    return 0;
+}
+
+static int time_all(const char *name, const struct fit_data *data)
+{
+    struct work w = {.control = {.canceled = NULL}};
+    double least[3] = {(double)INFINITY, (double)INFINITY, (double)INFINITY};
+    char what[3][100];
+    int stop = prepare(data, &w);
+    if (stop) {
+        fprintf(stderr, "%s: %s\n", name, fit_stop_text(stop));
+        return 1;
     }
-    say("covariance", name, least[0], "us");
-    say("five profiles", name, least[1] * 1e-3, "ms");
-    say("1000 bootstrap replicas", name, least[2] * 1e-3, "ms");
+    for (int round = 0; round < ROUNDS; round++) {
+        double ns[3] = {covariance_ns(&w), profiles_ns(&w), bootstrap_ns(&w)};
+        for (int i = 0; i < 3; i++)
+            least[i] = fmin(least[i], ns[i]);
+    }
+    const char *weights = data->u_per_sr ? "1/u^2" : "uniform";
+    snprintf(what[0], sizeof what[0], "covariance, %s, %s weights", name, weights);
+    snprintf(what[1], sizeof what[1], "five profiles, %s, %s weights", name, weights);
+    snprintf(what[2], sizeof what[2], "%d bootstrap replicas, %s, %s weights", REPLICAS, name,
+             weights);
+    report_row("uncertainty", what[0], least[0] * 1e-3, "us", 0, NULL);
+    report_row("uncertainty", what[1], least[1] * 1e-6, "ms", 0, NULL);
+    report_row("uncertainty", what[2], least[2] * 1e-6, "ms", 0, NULL);
     set_free(&w.set);
-    readings_free(&r);
+    return 0;
 }
 
 int main(void)
 {
-    static const struct {
-        const char *name;
-        struct brdf_params p;
-    } truth[TRUTHS] = {{"dielectric", {1.5, 0.02, 0.15, 0.9, 0.05}},
-                       {"metal", {1.3, 7.5, 0.12, 1, 0.01}},
-                       {"paper", {5.345064, 5.345064, 0.123451, 0.95, 0.092414}}};
-    for (int t = 0; t < TRUTHS; t++) {
-        char name[60];
+    int failed = 0;
+    for (size_t t = 0; t < sizeof truths / sizeof *truths; t++)
         for (int with_u = 0; with_u < 2; with_u++) {
-            snprintf(name, sizeof name, "%s, %s weights", truth[t].name,
-                     with_u ? "variance" : "uniform");
-            measure(name, &truth[t].p, with_u);
+            struct readings r;
+            measure(&truths[t].p, &r);
+            const struct fit_data data = {.count = READINGS,
+                                          .theta_i_rad = r.theta_i,
+                                          .theta_r_rad = r.theta_r,
+                                          .dphi_rad = r.dphi,
+                                          .f_per_sr = r.f,
+                                          .u_per_sr = with_u ? r.u : NULL};
+            failed += time_all(truths[t].name, &data);
         }
-    }
-    return 0;
+    return failed != 0;
 }
