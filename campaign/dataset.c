@@ -103,7 +103,7 @@ static int add(struct dataset *d, size_t *room, const struct row *r, struct gon_
     return GON_OK;
 }
 
-// What must hold for all rows together; without an uncertainty in each row there is none, and states
+// What must hold for all rows together: no uncertainty unless each row has one, and states
 // that are all u need no telling.
 static int finish(struct dataset *d, const char *column, struct gon_error *err)
 {

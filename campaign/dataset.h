@@ -6,8 +6,9 @@
 // f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in and
 // pol_out (u, s, p, +45, -45, R, L: model/state.h; without the column all are u). Other columns are
 // ignored. CRLF, a byte-order mark and rows that occur twice are fine. Errors are "file:line: ...",
-// GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged row, theta
-// outside [0, 90), a value column that is all zero, u_f_r <= 0, another state of polarisation.
+// GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged row,
+// theta outside [0, 90), a value column that is all zero, u_f_r <= 0, another state of
+// polarisation.
 #pragma once
 #include "base/err.h"
 #include "campaign/store.h"
@@ -21,7 +22,7 @@ enum { DATASET_ANGLES = 100 };
 struct dataset_filter {
     double theta_i_max_deg; // INFINITY: all
     double theta_i_deg[DATASET_ANGLES];
-    int theta_i_count; // 0: all
+    int theta_i_count;                  // 0: all
     double without_deg[DATASET_ANGLES]; // these sweeps are left out, whatever the rest says
     int without_count;
 };
@@ -29,10 +30,10 @@ struct dataset_filter {
 struct dataset {
     size_t count;
     double *theta_i_rad, *theta_r_rad, *dphi_rad, *f_per_sr;
-    double *u_per_sr; // NULL unless every row has one
+    double *u_per_sr;                // NULL unless every row has one
     unsigned char *pol_in, *pol_out; // enum brdf_state of each; NULL when all are u
-    double u_scale;   // relative standard uncertainty common to all; 0 from a CSV
-    size_t left_out;  // by the filter
+    double u_scale;                  // relative standard uncertainty common to all; 0 from a CSV
+    size_t left_out;                 // by the filter
     char source[512];
     char note[200]; // what the numbers are not (reduction_warning); "" when there is nothing to say
 };

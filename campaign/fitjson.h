@@ -23,15 +23,15 @@ struct fit_record {
     struct fit_result result;
     const char *trace; // text, may be NULL
     struct fit_hold_out hold_out;
-    char note[200];    // one more warning, of the data set; "": none
+    char note[200]; // one more warning, of the data set; "": none
 };
 
 // {"method","weights","points","seed","delta","params":{...},"derived":{...},"correlation":[...],
 // "chi2_per_dof","residual_lag1","advice":[{"measure","text","readings","u":{..},"gain"},..],
 // "evaluations","elapsed_ms","elapsed_total_ms","warnings":[...]}, and where asked for
 // "bootstrap":{"replicas","noise","params":{..},"derived":{..}} and "hold_out":{"theta_i_deg":[..],
-// "points","delta","chi2_per_point","rms_relative"}. 17 significant digits; what is not finite is null. indent: 0 one line, else that many blanks. Free
-// it; NULL without memory.
+// "points","delta","chi2_per_point","rms_relative"}. 17 significant digits; what is not finite is
+// null. indent: 0 one line, else that many blanks. Free it; NULL without memory.
 char *fit_json(const struct fit_record *f, int indent);
 
 const char *fit_method_name(enum fit_method m);       // "memetic", "paper"

@@ -60,8 +60,9 @@ struct reduction {
     int polarisation;   // of the light on the sample, enum polarisation
 };
 
-// What the numbers are not, in one sentence: with a laser of unknown polarisation they are neither f_00
-// nor anything else that could be named. Returns the length that snprintf would; 0: nothing to say.
+// What the numbers are not, in one sentence: with a laser of unknown polarisation they are neither
+// f_00 nor anything else that could be named. Returns the length that snprintf would; 0: nothing to
+// say.
 int reduction_warning(const struct reduction *r, char *text, size_t size);
 
 // Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark or no beam reading yet, or a

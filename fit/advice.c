@@ -21,8 +21,7 @@ static size_t stride_of(size_t count, size_t most)
 // --- information ---------------------------------------------------------------------------------
 
 void advice_information(const struct advice_plan *plan, const double x[N],
-                        enum brdf_diffuse diffuse, const struct noise *noise,
-                        double ret[N][N])
+                        enum brdf_diffuse diffuse, const struct noise *noise, double ret[N][N])
 {
     memset(ret, 0, N * sizeof *ret);
     for (size_t i = 0; i < plan->count; i++) {

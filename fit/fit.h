@@ -162,8 +162,9 @@ struct fit_result {
     struct fit_advice advice[FIT_MEASUREMENTS]; // the most helpful first
     int advice_count;                           // 0: nothing tells noise
     size_t advice_readings;                     // that each but FIT_MEASURE_NOTHING would add
-    double residual_lag1; // autocorrelation of neighbouring residuals within a sweep, each divided by
-                          // its noise, at the fit with weights 1/noise^2; NAN: none
+    // Autocorrelation of neighbouring residuals within a sweep, each divided by its noise, at the
+    // fit with weights 1/noise^2; NAN: none.
+    double residual_lag1;
     double largest_per_sr; // reading, without its sign
     unsigned warnings;      // of fit_warning
     long evaluations;       // of the whole data set
@@ -203,7 +204,7 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
 int fit_advice_text(const struct fit_result *r, int which, char *text, size_t size);
 const char *fit_measurement_name(enum fit_measurement m); // "nothing", "again", "grazing", ...
 
-// How well parameters describe readings that were held out of their fit. A negative fit_stop on fewer
+// How well parameters describe readings that were held out of the fit. A negative fit_stop on fewer
 // than five readings, bad data or options.
 struct fit_validation {
     size_t points;

@@ -16,7 +16,8 @@ static size_t sample_noise(const struct fit_data *d, enum brdf_diffuse diffuse, 
     for (size_t i = 0; i < d->count; i += stride, used++) {
         struct brdf_geometry g =
             brdf_geometry(d->theta_i_rad[i], d->theta_r_rad[i], d->dphi_rad[i]);
-        struct brdf_channel c = brdf_channel(&g, reading_state(d->pol_in, i), reading_state(d->pol_out, i));
+        struct brdf_channel c =
+            brdf_channel(&g, reading_state(d->pol_in, i), reading_state(d->pol_out, i));
         struct reading_direction at = reading_direction(&g, x);
         double j[N], f = reading_jacobian(&at, &c, x, diffuse, j), r = d->f_per_sr[i] - f;
         f2[used] = f * f;
@@ -27,8 +28,7 @@ static size_t sample_noise(const struct fit_data *d, enum brdf_diffuse diffuse, 
 
 // Least squares of s2 = a f2 + b with a and b >= 0, weighted with the variance that s2 has at the
 // last a and b: it scatters in proportion to itself.
-struct noise noise_of(const struct fit_data *data, enum brdf_diffuse diffuse,
-                                 const double x[N])
+struct noise noise_of(const struct fit_data *data, enum brdf_diffuse diffuse, const double x[N])
 {
     double f2[SAMPLE], s2[SAMPLE], a = 0, b = 0;
     size_t count = sample_noise(data, diffuse, x, f2, s2);

@@ -35,8 +35,8 @@ static double mix(const struct brdf_channel *c, const struct brdf_fresnel *f)
     return c->w_ss * f->ss + c->w_pp * f->pp + c->w_re * f->re + c->w_im * f->im;
 }
 
-double reading_jacobian(const struct reading_direction *d, const struct brdf_channel *c, const double x[N],
-                      enum brdf_diffuse diffuse, double j[N])
+double reading_jacobian(const struct reading_direction *d, const struct brdf_channel *c,
+                        const double x[N], enum brdf_diffuse diffuse, double j[N])
 {
     double ks = x[FIT_KS], a = d->height * mix(c, &d->f);
     double b = c->w_kd * (diffuse == BRDF_DIFFUSE_PAPER ? d->inv_cos_i : 1 / PI);

@@ -15,7 +15,8 @@ struct reading_direction {
 };
 
 // x: coordinates of fit/space.h.
-struct reading_direction reading_direction(const struct brdf_geometry *g, const double x[FIT_PARAMS]);
+struct reading_direction reading_direction(const struct brdf_geometry *g,
+                                           const double x[FIT_PARAMS]);
 
 // f in sr^-1 and its derivatives by the coordinates; of n and k^2 good to 1e-5.
 double reading_jacobian(const struct reading_direction *d, const struct brdf_channel *c,

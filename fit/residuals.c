@@ -23,11 +23,10 @@ static struct place place_of(const struct fit_data *d, size_t i, double r)
 {
     double dphi = remainder(d->dphi_rad[i], 2 * PI);
     double plane = dphi - PI * floor(dphi / PI + SAME_RAD);
-    return (struct place){d->theta_i_rad[i], fabs(plane) < SAME_RAD ? 0 : plane,
-                          copysign(d->theta_r_rad[i], -cos(dphi)),
-                          BRDF_STATES * (int)reading_state(d->pol_in, i) +
-                              (int)reading_state(d->pol_out, i),
-                          r};
+    return (struct place){
+        d->theta_i_rad[i], fabs(plane) < SAME_RAD ? 0 : plane,
+        copysign(d->theta_r_rad[i], -cos(dphi)),
+        BRDF_STATES * (int)reading_state(d->pol_in, i) + (int)reading_state(d->pol_out, i), r};
 }
 
 static int by_place(const void *a, const void *b)
@@ -119,8 +118,8 @@ static int compare_neighbours(const struct fit_data *data, const struct fit_set 
     return 0;
 }
 
-// The noise of each reading, `u` having room for them: as measured, or by the law that the residuals
-// follow. False: there is none.
+// The noise of each reading, `u` having room for them: as measured, or by the law that the
+// residuals follow. False: there is none.
 static bool noise_of_each(const struct fit_data *data, const struct fit_options *o,
                           const struct fit_set *set, const struct fit_optimum *optimum, double *u)
 {
@@ -139,8 +138,7 @@ static bool noise_of_each(const struct fit_data *data, const struct fit_options 
 // As compare_neighbours, at the fit with weights 1/noise^2.
 static int compare_reweighted(const struct fit_data *data, const struct fit_set *set,
                               const struct fit_options *options, const struct fit_optimum *optimum,
-                              struct fit_control *control, struct sums *ret_sums,
-                              double *ret_chi2)
+                              struct fit_control *control, struct sums *ret_sums, double *ret_chi2)
 {
     double *u = malloc(data->count * sizeof *u);
     struct fit_data weighted = *data;
@@ -177,9 +175,9 @@ int residuals_study(const struct fit_data *data, const struct fit_set *set,
     if (!chi2_at(set, p, control, &out.chi2))
         return FIT_E_CANCELED;
     out.least_chi2 = out.chi2;
-    int stop = as_given ? compare_neighbours(data, set, p, control, &sums)
-                        : compare_reweighted(data, set, options, optimum, control, &sums,
-                                             &out.least_chi2);
+    int stop =
+        as_given ? compare_neighbours(data, set, p, control, &sums)
+                 : compare_reweighted(data, set, options, optimum, control, &sums, &out.least_chi2);
     if (stop)
         return stop;
     if (sums.pairs > 0 && sums.square > 0)
