@@ -30,8 +30,7 @@ static void report_level(const struct task *t, const char *unit, double ratio, c
     report_row("eval", what, t->best_ns, unit, ratio, against);
 }
 
-// --- the paper's plan
-// -----------------------------------------------------------------------------
+// --- the paper's plan ----------------------------------------------------------------------------
 static int paper_tasks(const struct task *like, struct task *t)
 {
     const struct task each[] = {{.what = "f_00", .run = task_f00, .repeat = 50},
@@ -102,9 +101,8 @@ static void paper_plan(void)
     directions_free(&d);
 }
 
-// --- growth
-// --------------------------------------------------------------------------------------- What 1000
-// to 1,000,000 points cost each, with `distinct_share` of the directions differing.
+// --- growth --------------------------------------------------------------------------------------
+// What 1000 to 1,000,000 points cost each, with `distinct_share` of the directions differing.
 static void growth(const char *what, void (*run)(const struct task *), bool polarised)
 {
     struct directions d[SIZES];

@@ -25,8 +25,7 @@ void *eval_must(void *memory)
     exit(1);
 }
 
-// --- directions
-// -----------------------------------------------------------------------------------
+// --- directions ----------------------------------------------------------------------------------
 static struct directions directions_new(size_t room)
 {
     double *m = eval_must(calloc(4 * room, sizeof *m));
@@ -74,8 +73,7 @@ struct directions directions_random(size_t count, size_t distinct)
     return d;
 }
 
-// --- tasks
-// ----------------------------------------------------------------------------------------
+// --- tasks ---------------------------------------------------------------------------------------
 void task_naive(const struct task *t)
 {
     const struct directions *d = t->directions;
@@ -156,8 +154,7 @@ void tasks_take_turns(struct task *t, int count, int rounds)
         }
 }
 
-// --- the divider
-// ----------------------------------------------------------------------------------
+// --- the divider ---------------------------------------------------------------------------------
 static size_t divide(enum batch_level level, double *ret_sink)
 {
     enum { ROUNDS = 2000 };

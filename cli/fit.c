@@ -257,7 +257,8 @@ static int validate(const struct options *o, const char *file, struct fit_record
         return count;
     if (!strcmp(file, "-"))
         return gon_fail(err, GON_E_INPUT,
-                        "--hold-out %s: standard input cannot be read twice; give a file", o->hold_out);
+                        "--hold-out %s: standard input cannot be read twice; give a file",
+                        o->hold_out);
     filter.theta_i_count = record->hold_out.count = count;
     filter.theta_i_max_deg = 90;
     memcpy(record->hold_out.theta_i_deg, filter.theta_i_deg, sizeof filter.theta_i_deg);

@@ -30,4 +30,5 @@ int fit_paper_take(const struct fit_paper_words *words, struct fit_options *opti
                    struct gon_error *err);
 
 // "0,10,20.5" into degrees: the count. option: for messages.
-int fit_angles_take(const char *option, const char *text, double *ret_deg, int most, struct gon_error *err);
+int fit_angles_take(const char *option, const char *text, double *ret_deg, int most,
+                    struct gon_error *err);

@@ -3,8 +3,9 @@
 // and streams of server-sent events. Thread: main; never blocks.
 //
 // Limits: 32 connections (503 beyond, but never for a stop; 512 in all, silent ones included), 8
-// streams (503), 64 KiB of body (413), 8 KiB of header (431), 12 s of silence. A request with both Content-Length and Transfer-Encoding, or with two
-// lengths, is 400: the library would accept it, and two readers could understand it differently.
+// streams (503), 64 KiB of body (413), 8 KiB of header (431), 12 s of silence. A request with both
+// Content-Length and Transfer-Encoding, or with two lengths, is 400: the library would accept it,
+// and two readers could understand it differently.
 #pragma once
 #include "base/err.h"
 #include "daemon/events.h"

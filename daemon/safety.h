@@ -28,7 +28,7 @@ struct safety;
 // What may be said of the light, and nothing better.
 enum safety_light {
     SAFETY_LIGHT_OFF,         // the last off was read back, and no on was sent since
-    SAFETY_LIGHT_UNCONFIRMED, // no on was sent since an off that was read back; the last one was not
+    SAFETY_LIGHT_UNCONFIRMED, // the last off was not read back; no on since the last that was
     SAFETY_LIGHT_MAYBE        // on was sent, and no off was read back since
 };
 

@@ -26,9 +26,8 @@ BATCH_INLINE void load_channel(const struct set_rows *s, size_t i, vec w[SET_CHA
         w[c] = vec_load(s->channel[c] + i);
 }
 
-// --- values
-// --------------------------------------------------------------------------------------- a short
-// of a factor, the same for all rows.
+// --- values --------------------------------------------------------------------------------------
+// a short of a factor, the same for all rows.
 static double lead(const struct set_rows *s, const struct batch_point *p)
 {
     return s->channel[0] ? p->v : 4 * p->v * p->w;
@@ -96,8 +95,7 @@ static void moments(const struct set_rows *s, size_t from, size_t to,
                                     .rr = vec_sum(rr)};
 }
 
-// --- derivatives
-// -------------------------------------------------------------------------------------
+// --- derivatives ---------------------------------------------------------------------------------
 BATCH_INLINE void fill_columns(const struct set_rows *s, size_t at, size_t count,
                                const struct batch_point *p, double ks, double kd, bool polarised,
                                double (*column)[KERNEL_BLOCK])

@@ -138,7 +138,7 @@ static inline int port_event(void *ctx, const char *level, const char *source, c
     return 0;
 }
 
-// What is said of the light: off only when it is and that was read back, and a warning when it is on.
+// What is said of the light: off only when that was read back, and a warning when it is on.
 static inline void check_words(struct run *r, const struct engine_event *event)
 {
     struct instrument_snapshot s;

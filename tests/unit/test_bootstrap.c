@@ -81,8 +81,8 @@ static void spread_is_the_covariance_where_the_model_is_nearly_linear(void **sta
     readings_free(&r);
 }
 
-// 2 % noise is large in the peak and small in the wings: residuals drawn from one urn would give kd,
-// which the wings tell, the peak's noise.
+// 2 % noise is large in the peak and small in the wings: residuals drawn from one urn would give
+// kd, which the wings tell, the peak's noise.
 static void wild_noise_stays_where_it_was(void **state)
 {
     (void)state;

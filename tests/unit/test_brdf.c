@@ -118,7 +118,8 @@ static void fresnel_keeps_its_digits_everywhere(void **state)
             continue; // near the critical angle the last bit of beta moves R by its square root
         const long double complex index =
             (long double)n + (long double)k * (long double complex)_Complex_I;
-        const long double complex above = (index - 1) * (index + 1), q = csqrtl(above + (long double)c2);
+        const long double complex above = (index - 1) * (index + 1);
+        const long double complex q = csqrtl(above + (long double)c2);
         const long double c = sqrtl((long double)c2), sin2 = 1 - (long double)c2;
         const long double rs = cabsl(above / ((c + q) * (c + q)));
         const long double rp = rs * cabsl((sin2 - q * c) / (sin2 + q * c));

@@ -245,9 +245,9 @@ static void all_that_is_unplugged_is_named_and_the_light_comes_first(void **stat
     r->on_row = unplug_laser_and_axes_at_row_13;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_string_equal(r->pauses[0], "LASER MAY BE ON: use its key or the interlock; axis theta_i, "
-                                      "axis theta_r, axis sample, laser: unplugged; waiting for "
-                                      "them to come back");
+    assert_string_equal(r->pauses[0],
+                        "LASER MAY BE ON: use its key or the interlock; axis theta_i, axis theta_r, "
+                        "axis sample, laser: unplugged; waiting for them to come back");
     end(r);
 }
 

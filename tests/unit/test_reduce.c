@@ -310,7 +310,7 @@ static void a_laser_of_unknown_polarisation_is_said(void **state)
     (void)state;
     char text[200];
     struct reduction r = {.polarisation = POL_S};
-    assert_int_equal(reduction_warning(&r, text, sizeof text), 0); // the fit knows what to do with it
+    assert_int_equal(reduction_warning(&r, text, sizeof text), 0); // the fit knows what to do
     r.polarisation = POL_UNKNOWN;
     reduction_warning(&r, text, sizeof text);
     assert_non_null(strstr(text, "is unknown"));
