@@ -5,6 +5,7 @@
 #include "bench/naive.h"
 #include "bench/report.h"
 #include "fit/kernel.h"
+#include "fit/passes.h"
 #include "fit/rng.h"
 #include "fit/space.h"
 
@@ -112,12 +113,12 @@ static void run_pass(const struct task *t, pass *sums)
 
 void task_moments(const struct task *t)
 {
-    run_pass(t, kernel_moments);
+    run_pass(t, passes_moments);
 }
 
 void task_gram(const struct task *t)
 {
-    run_pass(t, kernel_gram);
+    run_pass(t, passes_gram);
 }
 
 struct fit_set set_of(const struct directions *d, enum batch_level level, bool polarised)

@@ -63,35 +63,6 @@ void kernel_add(struct kernel_gram *sum, const struct kernel_gram *part)
             sum->m[i][j] += part->m[i][j];
 }
 
-static bool in_parts(const struct fit_set *set, const double x[FIT_PARAMS], kernel_sums *sums,
-                     struct fit_control *control, struct kernel_gram *ret_gram)
-{
-    size_t length = kernel_part(set), padded = set->distinct.padded;
-    struct kernel_gram sum = {.m = {{0}}}, part = {.m = {{0}}};
-    for (size_t from = 0; from < padded; from += length) {
-        size_t to = padded - from < length ? padded : from + length;
-        if (control_spend(control, to - from))
-            return false;
-        sums(set, x, from, to, from ? &part : &sum);
-        if (from)
-            kernel_add(&sum, &part);
-    }
-    *ret_gram = sum;
-    return true;
-}
-
-bool kernel_moments(const struct fit_set *set, const double x[FIT_PARAMS],
-                    struct fit_control *control, struct kernel_gram *ret_gram)
-{
-    return in_parts(set, x, kernel_moments_of, control, ret_gram);
-}
-
-bool kernel_gram(const struct fit_set *set, const double x[FIT_PARAMS], struct fit_control *control,
-                 struct kernel_gram *ret_gram)
-{
-    return in_parts(set, x, kernel_gram_of, control, ret_gram);
-}
-
 // --- single readings -----------------------------------------------------------------------------
 size_t kernel_jacobian(const struct fit_set *set, const double x[FIT_PARAMS], size_t at,
                        struct kernel_block *ret_block)

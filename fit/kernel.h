@@ -10,7 +10,6 @@
 // columns' lengths. The exponent stays at KERNEL_EXP2_LEAST, so that its square does not underflow.
 // Reported values come from model/brdf.h, not from here. Nothing allocates. Any thread.
 #pragma once
-#include "fit/control.h"
 #include "fit/set.h"
 
 #define KERNEL_EXP2_LEAST -430.0
@@ -40,12 +39,6 @@ void kernel_add(struct kernel_gram *sum, const struct kernel_gram *part);
 #define KERNEL_PARTS 64
 #define KERNEL_PART_BLOCKS 8 // at least
 size_t kernel_part(const struct fit_set *set);
-
-// All parts in order, on the calling thread. False when canceled.
-bool kernel_moments(const struct fit_set *set, const double x[FIT_PARAMS],
-                    struct fit_control *control, struct kernel_gram *ret_gram);
-bool kernel_gram(const struct fit_set *set, const double x[FIT_PARAMS], struct fit_control *control,
-                 struct kernel_gram *ret_gram);
 
 // One block from reading `at` (a multiple of SET_LANES) on, for sums of other kinds: the
 // derivatives of the model by x (ks multiplied in where it belongs) and the residuals, of single

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Passes over the whole set: kernel_moments and kernel_gram with the parts shared over
-// control->pool and added in their order, so that the sums are the same to the bit as on one
-// thread. Within a task of the pool (a niche, an individual) they run on that task's thread.
+// Passes over the whole set: the sums of fit/kernel.h, the parts shared over control->pool (without
+// one all of them on the calling thread) and added in their order, so that they are the same to the
+// bit. Within a task of the pool (a niche, an individual) they run on that task's thread.
 #pragma once
 #include "fit/control.h"
 #include "fit/kernel.h"

@@ -2,6 +2,7 @@
 #include "bench/peers/attempt.h"
 
 #include "fit/kernel.h"
+#include "fit/passes.h"
 #include "fit/varpro.h"
 
 #include <string.h>
@@ -87,7 +88,7 @@ double attempt_value(struct attempt *a, const double gene[ATTEMPT_GENES])
     double x[FIT_PARAMS], dx[ATTEMPT_GENES];
     struct kernel_gram gram;
     decode(a, gene, x, dx);
-    kernel_moments(&a->task->set, x, &a->control, &gram);
+    passes_moments(&a->task->set, x, &a->control, &gram);
     double delta = varpro_solve(&gram, x, &a->task->space).q / a->task->set.ff;
     a->values++;
     keep(a, gene, delta);
@@ -99,7 +100,7 @@ static struct varpro project(struct attempt *a, const double gene[], double dx[]
 {
     double x[FIT_PARAMS];
     decode(a, gene, x, dx);
-    kernel_gram(&a->task->set, x, &a->control, gram);
+    passes_gram(&a->task->set, x, &a->control, gram);
     struct varpro v = varpro_solve(gram, x, &a->task->space);
     a->slopes++;
     keep(a, gene, v.q / a->task->set.ff);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: fit model
 #include "fit/kernel.h"
+#include "fit/passes.h"
 #include "fit/objective.h"
 #include "fit/repeats.h"
 #include "fit/space.h"
@@ -86,7 +87,7 @@ static struct kernel_gram gram_of(const struct fit_set *set, const struct brdf_p
     struct kernel_gram g;
     struct fit_control control = {.stop = false};
     space_of_params(p, x);
-    assert_true(kernel_gram(set, x, &control, &g));
+    assert_true(passes_gram(set, x, &control, &g));
     return g;
 }
 
@@ -96,7 +97,7 @@ static struct kernel_gram moments_of(const struct fit_set *set, const struct brd
     struct kernel_gram g;
     struct fit_control control = {.stop = false};
     space_of_params(p, x);
-    assert_true(kernel_moments(set, x, &control, &g));
+    assert_true(passes_moments(set, x, &control, &g));
     return g;
 }
 
@@ -163,7 +164,7 @@ static void searching_repeated_readings_costs_their_geometries(void **state)
     struct measured m = measured_new(100, 50, false, &rng);
     struct fit_set set = compiled(&m, false, FIT_UNIFORM);
     space_of_params(&surfaces[0], x);
-    assert_true(kernel_moments(&set, x, &control, &g));
+    assert_true(passes_moments(&set, x, &control, &g));
     assert_near(control.points, 104, 0); // padded
     set_free(&set);
     measured_free(&m);
@@ -265,11 +266,11 @@ static void passes_ask_often_and_stop(void **state)
     for (int asks = 0; asks < 5; asks++) {
         int left = asks;
         struct fit_control control = {.canceled = count_and_stop, .ctx = &left};
-        assert_false(kernel_gram(&set, x, &control, &g));
+        assert_false(passes_gram(&set, x, &control, &g));
         assert_true(control.points <= (asks + 1) * 1.2 * (double)CONTROL_SLICE);
         left = asks;
         control = (struct fit_control){.canceled = count_and_stop, .ctx = &left};
-        assert_false(kernel_moments(&set, x, &control, &g));
+        assert_false(passes_moments(&set, x, &control, &g));
     }
     set_free(&set);
     measured_free(&m);

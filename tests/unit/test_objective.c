@@ -2,6 +2,7 @@
 // uses: fit model
 #include "fit/objective.h"
 #include "fit/kernel.h"
+#include "fit/passes.h"
 #include "fit/space.h"
 #include "tests/unit/readings.h"
 
@@ -116,8 +117,8 @@ static void kernel_sums_are_those_of_the_model(void **state)
             double x[FIT_PARAMS], rr = 0;
             assert_int_equal(set_compile(&data, &o, &control, &set), 0);
             space_of_params(&p[j], x);
-            assert_true(kernel_moments(&set, x, &control, &gram));
-            assert_true(kernel_gram(&set, x, &control, &full));
+            assert_true(passes_moments(&set, x, &control, &gram));
+            assert_true(passes_gram(&set, x, &control, &full));
             for (size_t i = 0; i < count; i++)
                 rr += pow(objective_residual(&set, &p[j], i), 2);
             assert_near(gram.m[KERNEL_R][KERNEL_R] / rr, 1, 1e-11);

@@ -2,6 +2,7 @@
 // uses: fit model
 #include "fit/polish.h"
 #include "fit/kernel.h"
+#include "fit/passes.h"
 #include "fit/rng.h"
 #include "fit/varpro.h"
 #include "tests/unit/readings.h"
@@ -80,7 +81,7 @@ static double reduced_q(const struct fit_set *set, const struct fit_space *space
 {
     struct kernel_gram g;
     struct fit_control control = {.stop = false};
-    assert_true(kernel_moments(set, x, &control, &g));
+    assert_true(passes_moments(set, x, &control, &g));
     return varpro_solve(&g, x, space).q;
 }
 
