@@ -214,8 +214,8 @@ static void an_unplugged_device_pauses_by_name_and_resumes(void **state)
     (void)state;
     static const char *const texts[] = {
         "axis theta_i, axis theta_r, axis sample: unplugged; waiting for them to come back",
-        "LASER MAY BE ON: use its key or the interlock; laser: unplugged; waiting for it to come "
-        "back",
+        ("LASER MAY BE ON: use its key or the interlock; laser: unplugged; waiting for it to come "
+         "back"),
         "detector: unplugged; waiting for it to come back"};
     for (unplug_which = 0; unplug_which < SIMBENCH_DEVICES; unplug_which++) {
         struct run *r = begin(NULL);
