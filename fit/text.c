@@ -79,23 +79,43 @@ static int measurement_text(const struct fit_advice *a, char *text, size_t size)
     return snprintf(text, size, "?");
 }
 
+// "550 %", "3.9 %", "0.018 %": two digits, and no exponent where a person reads.
+static void percent_text(double part, char *text, size_t size)
+{
+    const int before = part > 0 ? (int)floor(log10(100 * part)) : 0;
+    snprintf(text, size, "%.*f %%", before < 1 ? 1 - before : 0, 100 * part);
+}
+
+// The parameter that gains most, of those that are not identified if there are any.
+static int most_helped(const struct fit_result *r, const struct fit_advice *a)
+{
+    int most = 0;
+    double most_gain = 0;
+    for (int i = 0; i < FIT_PARAMS; i++) {
+        const double ratio = a->u[i] > 0 ? r->estimate[i].u / a->u[i] : 0;
+        const double gain = r->estimate[i].identified ? -1 / (1 + ratio) : ratio;
+        if (i == 0 || gain > most_gain) {
+            most_gain = gain;
+            most = i;
+        }
+    }
+    return most;
+}
+
 int fit_advice_text(const struct fit_result *r, int which, char *text, size_t size)
 {
     const struct fit_advice *a = &r->advice[which];
     char what[100];
-    int most = 0;
-    double ratio = 0;
-    for (int i = 0; i < FIT_PARAMS; i++)
-        if (a->u[i] > 0 && r->estimate[i].u / a->u[i] > ratio) {
-            ratio = r->estimate[i].u / a->u[i];
-            most = i;
-        }
+    const int most = most_helped(r, a);
     const struct fit_estimate *e = &r->estimate[most];
     measurement_text(a, what, sizeof what);
-    if (e->value > 0 && e->u < 100 * e->value)
-        return snprintf(text, size, "%s: u(%s) %.2g %% -> %.2g %%", what,
-                        fit_param_name((enum fit_param)most), 100 * e->u / e->value,
-                        100 * a->u[most] / e->value);
+    if (e->value > 0 && e->u < 100 * e->value) {
+        char now[40], then[40];
+        percent_text(e->u / e->value, now, sizeof now);
+        percent_text(a->u[most] / e->value, then, sizeof then);
+        return snprintf(text, size, "%s: u(%s) %s -> %s", what,
+                        fit_param_name((enum fit_param)most), now, then);
+    }
     return snprintf(text, size, "%s: u(%s) %.2g -> %.2g", what,
                     fit_param_name((enum fit_param)most), e->u, a->u[most]);
 }
