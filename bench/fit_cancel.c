@@ -8,42 +8,10 @@
 #include "bench/report.h"
 #include "fit/fit.h"
 #include "tests/unit/samples.h"
+#include "tests/unit/stopper.h"
 
-#include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
-
-static double clock_ms(clockid_t id)
-{
-    struct timespec t;
-    clock_gettime(id, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
-struct stop {
-    atomic_bool raised;
-    double after_ms;
-    double wall_ms, cpu_ms; // when it was raised
-};
-
-static bool canceled(void *ctx)
-{
-    struct stop *s = ctx;
-    return atomic_load(&s->raised);
-}
-
-static void *raise_later(void *ctx)
-{
-    struct stop *s = ctx;
-    struct timespec t = {(time_t)(s->after_ms / 1e3), (long)(fmod(s->after_ms, 1e3) * 1e6)};
-    nanosleep(&t, NULL);
-    s->wall_ms = clock_ms(CLOCK_MONOTONIC);
-    s->cpu_ms = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
-    atomic_store(&s->raised, true);
-    return NULL;
-}
 
 static int by_value(const void *a, const void *b)
 {
@@ -57,18 +25,11 @@ enum { TIMES_MOST = 1000 };
 static bool stop_once(const struct fit_data *data, struct fit_options *o, double after_ms,
                       double *ret_wall_ms, double *ret_cpu_ms)
 {
-    struct stop stop = {.after_ms = after_ms};
+    struct stopper stop = {.after_ms = after_ms, .processor = CLOCK_PROCESS_CPUTIME_ID};
     struct fit_result result;
-    pthread_t thread;
-    o->canceled = canceled;
-    o->cancel_ctx = &stop;
-    if (pthread_create(&thread, NULL, raise_later, &stop))
+    const int rc = stopper_fit(&stop, data, o, &result, ret_wall_ms, ret_cpu_ms);
+    if (rc == FIT_E_MEMORY)
         exit(1);
-    int rc = fit_run(data, o, &result);
-    double wall = clock_ms(CLOCK_MONOTONIC), cpu = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
-    pthread_join(thread, NULL);
-    *ret_wall_ms = wall - stop.wall_ms;
-    *ret_cpu_ms = cpu - stop.cpu_ms;
     return rc == FIT_E_CANCELED;
 }
 
@@ -83,10 +44,10 @@ static void study(const struct readings *r, enum fit_method method, int threads,
     o.weighting = FIT_VARIANCE;
     o.threads = threads;
     o.paper.generations = r->count > 10000 ? 5 : 100;
-    double from = clock_ms(CLOCK_MONOTONIC);
+    double from = stopper_clock_ms(CLOCK_MONOTONIC);
     if (fit_run(&data, &o, &result))
         exit(1);
-    double whole = clock_ms(CLOCK_MONOTONIC) - from;
+    double whole = stopper_clock_ms(CLOCK_MONOTONIC) - from;
     int count = 0;
     for (int i = 0; i < times; i++)
         count += stop_once(&data, &o, whole * rng_uniform(rng), &wall[count], &cpu[count]);

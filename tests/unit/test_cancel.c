@@ -3,14 +3,12 @@
 #include "fit/fit.h"
 #include "fit/rng.h"
 #include "tests/unit/readings.h"
+#include "tests/unit/stopper.h"
 
-#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
-#include <stdatomic.h>
 #include <stddef.h>
 #include <stdlib.h>
-#include <time.h>
 #include <cmocka.h>
 
 #ifdef __SANITIZE_ADDRESS__
@@ -21,58 +19,23 @@
 
 static uint64_t seed = 20081;
 
-static double clock_ms(clockid_t id)
-{
-    struct timespec t;
-    clock_gettime(id, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
-struct stop {
-    atomic_bool raised;
-    double after_ms, wall_ms, cpu_ms;
-    clockid_t fit; // processor's time of the thread that fits
-};
-
-static bool canceled(void *ctx)
-{
-    struct stop *s = ctx;
-    return atomic_load(&s->raised);
-}
-
-static void *raise_later(void *ctx)
-{
-    struct stop *s = ctx;
-    struct timespec t = {(time_t)(s->after_ms / 1e3), (long)(fmod(s->after_ms, 1e3) * 1e6)};
-    nanosleep(&t, NULL);
-    s->wall_ms = clock_ms(CLOCK_MONOTONIC);
-    s->cpu_ms = clock_ms(s->fit);
-    atomic_store(&s->raised, true);
-    return NULL;
-}
-
 // Returns whether it was stopped before its end. What counts is the processor's time of the fitting
 // thread, which a busy machine does not lengthen; the clock's is printed.
 static bool stop_after(const struct readings *r, struct fit_options *o, double after_ms,
                        double *longest_cpu_ms, double *longest_wall_ms)
 {
     struct fit_data data = readings_data(r, true);
-    struct stop stop = {.after_ms = after_ms};
+    struct stopper stop = {.after_ms = after_ms};
     struct fit_result result = {.delta = 42};
-    pthread_t thread;
-    o->canceled = canceled;
-    o->cancel_ctx = &stop;
-    assert_int_equal(pthread_getcpuclockid(pthread_self(), &stop.fit), 0);
-    assert_int_equal(pthread_create(&thread, NULL, raise_later, &stop), 0);
-    int rc = fit_run(&data, o, &result);
-    double wall = clock_ms(CLOCK_MONOTONIC), cpu = clock_ms(CLOCK_THREAD_CPUTIME_ID);
-    pthread_join(thread, NULL);
+    double wall_ms, cpu_ms;
+    assert_int_equal(pthread_getcpuclockid(pthread_self(), &stop.processor), 0);
+    const int rc = stopper_fit(&stop, &data, o, &result, &wall_ms, &cpu_ms);
     if (rc == FIT_OK)
         return false;
     assert_int_equal(rc, FIT_E_CANCELED);
     assert_near(result.delta, 42, 0);
-    *longest_cpu_ms = fmax(*longest_cpu_ms, cpu - stop.cpu_ms);
-    *longest_wall_ms = fmax(*longest_wall_ms, wall - stop.wall_ms);
+    *longest_cpu_ms = fmax(*longest_cpu_ms, cpu_ms);
+    *longest_wall_ms = fmax(*longest_wall_ms, wall_ms);
     return true;
 }
 
