@@ -176,7 +176,9 @@ static struct http_reply post_stop(const struct call *c)
 {
     char why[100];
     snprintf(why, sizeof why, "stopped by uid %ld, pid %ld", c->request->uid, c->request->pid);
-    hub_stop(c->hub, why, c->ticket);
+    if (!hub_stop(c->hub, why, c->ticket))
+        return fail(503, "a stop is under way, and 32 others wait for its end already", NULL,
+                    "see: gonio status");
     return reply(HTTP_LATER, NULL);
 }
 

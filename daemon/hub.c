@@ -248,15 +248,14 @@ int hub_submit(struct hub *h, int run, struct gon_error *err)
     return queue_submit(h->queue, run, err);
 }
 
-void hub_stop(struct hub *h, const char *why, uint64_t ticket)
+bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
 {
-    if (h->stop_count == MOST_STOPS)
-        http_answer(h->http, ticket, 503,
-                    http_error("a stop is under way", NULL, "see: gonio status"));
-    else
+    const bool room = h->stop_count < MOST_STOPS;
+    if (room)
         h->stops[h->stop_count++] = ticket;
     if (!queue_stop(h->queue, why))
         note_post(h->run_box, note_new(NOTE_HALT));
+    return room;
 }
 
 static int to_active(struct hub *h, enum note_kind kind, bool paused, struct gon_error *err)

@@ -53,7 +53,9 @@ void hub_create(struct hub *h, const char *config, const char *name, uint64_t ti
 // The run that is paused goes on; any other one is queued. GON_E_REFUSED, GON_E_INPUT.
 int hub_submit(struct hub *h, int run, struct gon_error *err);
 void hub_submit_path(struct hub *h, const char *path, uint64_t ticket);
-void hub_stop(struct hub *h, const char *why, uint64_t ticket);
+// Stops in any case; false: 32 tickets wait for the end of a stop already, and this one will not be
+// answered.
+bool hub_stop(struct hub *h, const char *why, uint64_t ticket);
 int hub_pause(struct hub *h, struct gon_error *err);  // the run that has the bench: its id
 int hub_resume(struct hub *h, struct gon_error *err); // the paused run: its id
 

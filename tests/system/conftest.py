@@ -47,6 +47,14 @@ def query(file, sql):
         db.close()
 
 
+def wait_for(true, patience_s=PATIENCE_S):
+    """Until true() is: for what is announced by nothing."""
+    end = time.monotonic() + patience_s
+    while not true():
+        assert time.monotonic() < end, f"not within {patience_s} s"
+        time.sleep(0.02)
+
+
 class Program:
     """A program whose standard output is read line by line; standard error goes to a file."""
 

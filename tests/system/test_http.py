@@ -3,12 +3,14 @@
 import json
 import os
 import socket
+import sqlite3
 import stat
+import threading
 import time
 
 import pytest
 
-from conftest import PATIENCE_S, Stream
+from conftest import PATIENCE_S, Stream, wait_for
 
 
 def raw(daemon, data):
@@ -154,3 +156,29 @@ def test_a_stop_gets_through_whatever_others_hold_open(start_daemon):
     finally:
         for s in silent:
             s.close()
+
+
+def test_every_stop_is_answered_however_many_come_at_once(start_daemon):
+    """The file's write lock is held, so that the first 32 have to wait for the run's end."""
+    daemon = start_daemon()
+    reply = daemon.submit()
+    daemon.follow(reply["event_id"]).until(lambda e: e["event"] == "reading")
+    db = sqlite3.connect(reply["file"], isolation_level=None)
+    db.execute("begin immediate")
+    answers = []
+
+    def stop():
+        answers.append(daemon.request("POST", "/api/v1/stop"))
+
+    threads = [threading.Thread(target=stop) for _ in range(40)]
+    for t in threads:
+        t.start()
+    wait_for(lambda: len(answers) == 8)
+    db.execute("rollback")
+    for t in threads:
+        t.join()
+    db.close()
+    refused = [body for status, body in answers if status == 503]
+    assert len(answers) == 40 and len(refused) == 8, answers
+    assert all("a stop is under way" in body["error"] for body in refused)
+    assert all(body["state"] == "stopped" for status, body in answers if status == 200)
