@@ -5,6 +5,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <limits.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -47,9 +48,37 @@ int cfg_line(const config_setting_t *s)
     return line > 0 ? line : 1;
 }
 
-void cfg_show(const config_setting_t *s, char *text, size_t size)
+static const char *skip(const char *p);
+
+// libconfig keeps the low half of a hexadecimal number: the one with that half, from the setting's
+// line on, is what was written.
+static void show_hex(const struct cfg_file *f, const config_setting_t *s, char *text, size_t size)
+{
+    const uint32_t half = (uint32_t)config_setting_get_int64(s);
+    const char *p = f->text;
+    for (int line = 1; *p && line < cfg_line(s); p++)
+        line += *p == '\n';
+    while (*p) {
+        const char *end = skip(p);
+        if (end == p && p[0] == '0' && (p[1] == 'x' || p[1] == 'X')) {
+            end = p + 2 + strspn(p + 2, "0123456789abcdefABCDEF");
+            if ((uint32_t)strtoull(p, NULL, 16) == half) {
+                snprintf(text, size, "%.*s", (int)(end - p), p);
+                return;
+            }
+        }
+        p = end > p ? end : p + 1;
+    }
+    snprintf(text, size, "0x%" PRIx32, half);
+}
+
+void cfg_show(const struct cfg_file *f, const config_setting_t *s, char *text, size_t size)
 {
     const char *string;
+    if (config_setting_get_format(s) == CONFIG_FORMAT_HEX) {
+        show_hex(f, s, text, size);
+        return;
+    }
     switch (config_setting_type(s)) {
     case CONFIG_TYPE_INT:
     case CONFIG_TYPE_INT64:
@@ -313,6 +342,6 @@ int cfg_complain(struct cfg_file *f, const char *path, const char *fmt, ...)
     vsnprintf(text, sizeof text, fmt, args);
     va_end(args);
     if (exact)
-        cfg_show(s, value, sizeof value);
+        cfg_show(f, s, value, sizeof value);
     return cfg_say(f, cfg_line(s), "%s%s%s: %s", path, *value ? " = " : "", value, text);
 }

@@ -19,7 +19,7 @@ int cfg_say(struct cfg_file *f, int line, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 
 // The setting's value as a person would write it, shortened; "" for none.
-void cfg_show(const config_setting_t *s, char *text, size_t size);
+void cfg_show(const struct cfg_file *f, const config_setting_t *s, char *text, size_t size);
 
 // The line a setting stands on, at least 1; of its nearest ancestor when libconfig knows none.
 int cfg_line(const config_setting_t *s);

@@ -48,7 +48,7 @@ static int wrong(const struct place *at, const config_setting_t *s, const char *
     va_start(args, fmt);
     vsnprintf(text, sizeof text, fmt, args);
     va_end(args);
-    cfg_show(s, value, sizeof value);
+    cfg_show(at->file, s, value, sizeof value);
     return cfg_say(at->file, cfg_line(s), "%s = %s: %s", at->path, value, text);
 }
 

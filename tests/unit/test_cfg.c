@@ -184,7 +184,12 @@ static void numbers_that_libconfig_bends_are_refused(void **state)
     complains(
         "campaign: { theta_i_deg = 5; weight = 1e400; theta_r: { from_deg = 0x1FFFFFFFF; }; };",
         "c.cfg:1: campaign.weight = inf: out of range\n"
-        "c.cfg:1: campaign.theta_r.from_deg = -1: hexadecimal; write a decimal number\n");
+        "c.cfg:1: campaign.theta_r.from_deg = 0x1FFFFFFFF: hexadecimal; write a decimal "
+        "number\n");
+    complains(GOOD "axes = (\n# 0x10\n{ name = \"0x10\"; speed = 0x10; /* 0x11 */ }, "
+                   "{ name = \"b\"; speed = 0X1000000011; } );",
+              "c.cfg:4: axes[0].speed = 0x10: hexadecimal; write a decimal number\n"
+              "c.cfg:4: axes[1].speed = 0X1000000011: hexadecimal; write a decimal number\n");
     complains(
         "# 3000000000 \" /*\n/* 3000000000 */ a3000000000 = \"\\\" 3000000000\";\nb = -3000000000;",
         "c.cfg:3: 3000000000: too large for a whole number\n");
