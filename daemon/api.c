@@ -5,6 +5,7 @@
 #include "daemon/view.h"
 
 #include <jansson.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,6 +73,14 @@ char *api_error(int gon_code, const char *text)
     return http_error(what, where, next ? next + 2 : what_to_do(gon_code));
 }
 
+char *api_complaints(const char *text)
+{
+    char *copy = strdup(text), *what = copy, *where = copy ? cut_where(&what) : NULL;
+    char *body = http_error(copy ? what : "out of memory", where, what_to_do(GON_E_INPUT));
+    free(copy);
+    return body;
+}
+
 static struct http_reply failed(const struct gon_error *err)
 {
     return reply(api_status(err->code), api_error(err->code, err->text));
@@ -109,12 +118,17 @@ static struct http_reply get_runs(const struct call *c)
     return reply(200, view_text(json_pack("{s:o}", "runs", all)));
 }
 
+// A run has one address: its number without a sign, leading zeros or anything around it. 0: none.
+static int run_number(const char *text)
+{
+    const size_t digits = strspn(text, "0123456789");
+    const long id = digits && digits < 11 && *text != '0' && !text[digits] ? atol(text) : 0;
+    return id <= INT_MAX ? (int)id : 0;
+}
+
 static struct http_reply get_run(const struct call *c)
 {
-    char *end;
-    long id = strtol(c->rest, &end, 10);
-    const struct run *run =
-        *end || end == c->rest || id > 2147483647 ? NULL : queue_run(hub_queue(c->hub), (int)id);
+    const struct run *run = queue_run(hub_queue(c->hub), run_number(c->rest));
     if (!run)
         return fail(404, "there is no such run", c->request->path, "see: gonio list");
     return reply(200, view_text(view_run(run, true)));
@@ -136,7 +150,7 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
         return reply(HTTP_LATER, NULL);
     }
     json_int_t id = json_integer_value(what);
-    if (!json_is_integer(what) || id < 1 || id > 2147483647)
+    if (!json_is_integer(what) || id < 1 || id > INT_MAX)
         return fail(400, "\"resume\" is neither a run's number nor a path", NULL,
                     "see: gonio list");
     uint64_t event_id = hub_event_id(c->hub);
@@ -243,8 +257,9 @@ struct http_reply api_request(void *hub, const struct http_request *request, uin
     if (!same_path)
         return fail(404, "there is no such resource", request->path,
                     "see /api/v1/status, /api/v1/runs, /api/v1/events");
-    struct http_reply r =
-        fail(405, "that method is not for this resource", request->path, same_path->allow);
+    char use[40];
+    snprintf(use, sizeof use, "use: %s", same_path->allow);
+    struct http_reply r = fail(405, "that method is not for this resource", request->path, use);
     r.allow = same_path->allow;
     return r;
 }

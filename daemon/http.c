@@ -369,6 +369,15 @@ __attribute__((format(printf, 2, 0))) static void say(void *ctx, const char *for
     log_say(h->log, LOG_DEBUG, "http", "%s", text);
 }
 
+// A zero byte would end the path early, and it would name something else: left as it is, it names
+// nothing.
+static size_t unescape(void *cls, struct MHD_Connection *c, char *text)
+{
+    (void)cls;
+    (void)c;
+    return strstr(text, "%00") ? strlen(text) : MHD_http_unescape(text);
+}
+
 static struct MHD_Daemon *start(struct http *h, int fd)
 {
     return MHD_start_daemon(
@@ -378,7 +387,8 @@ static struct MHD_Daemon *start(struct http *h, int fd)
         MHD_OPTION_NOTIFY_CONNECTION, connection_changed, h, MHD_OPTION_CONNECTION_LIMIT,
         (unsigned)(MOST_CONNECTIONS + SPARE_CONNECTIONS), MHD_OPTION_CONNECTION_MEMORY_LIMIT,
         (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)SILENCE_S,
-        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
+        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_UNESCAPE_CALLBACK, unescape, h,
+        MHD_OPTION_END);
 }
 
 struct http *http_new(struct loop *loop, int listen_fd, const struct events *events,

@@ -296,7 +296,7 @@ static void known(struct hub *h, struct note *n)
         if (rc == GON_E_STORE)
             snprintf(h->last_error, sizeof h->last_error, "%s", err.text);
         http_answer(h->http, n->ticket, api_status(rc),
-                    api_error(rc, n->text ? n->text : err.text));
+                    n->text ? api_complaints(n->text) : api_error(rc, err.text));
     }
 }
 

@@ -52,8 +52,9 @@ def test_unknown_resources_and_methods(daemon):
     assert daemon.request("GET", "/api/v1/runs/999")[0] == 404
     assert daemon.request("GET", "/api/v1/runs/x")[0] == 404
     status, body = daemon.request("DELETE", "/api/v1/runs")
-    assert status == 405 and "GET, POST" in body["what_to_do"]
-    assert daemon.request("GET", "/api/v1/stop")[0] == 405
+    assert status == 405 and body["what_to_do"] == "use: GET, POST"
+    status, body = daemon.request("GET", "/api/v1/stop")
+    assert status == 405 and body["what_to_do"] == "use: POST"
 
 
 @pytest.mark.parametrize("body", [
@@ -74,6 +75,25 @@ def test_a_wrong_configuration_names_its_lines(daemon):
     text = json.dumps(reply)
     assert "configs/bad.cfg:3" in text and "configs/bad.cfg:4" in text and "stpe" in text
     assert daemon.request("GET", "/api/v1/runs")[1]["runs"] == []
+
+
+@pytest.mark.parametrize("config, error", [
+    ("", "x.cfg:1: campaign: missing; What to measure."),
+    ("campaign: { name = ", "x.cfg:2: syntax error; look for a missing ';', quote or bracket here or on the line before"),
+])
+def test_a_complaint_about_a_configuration_is_whole(daemon, config, error):
+    status, body = daemon.request("POST", "/api/v1/runs", {"config": config, "name": "x.cfg"})
+    where, what = error.split(": ", 1)
+    assert status == 400
+    assert body == {"error": what, "where": where, "what_to_do": "mend it and try again"}
+
+
+def test_a_run_has_one_address(start_daemon):
+    daemon = start_daemon()
+    run = daemon.submit()["run"]
+    assert run == 1 and daemon.request("GET", "/api/v1/runs/1")[0] == 200
+    for other in ("+1", "01", "1%00", "%201", "-1", "1x", "1/", "", "0", "4294967297", "9" * 40):
+        assert daemon.request("GET", f"/api/v1/runs/{other}")[0] == 404, other
 
 
 def test_nothing_to_pause_or_resume_is_a_conflict(daemon):
