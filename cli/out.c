@@ -100,13 +100,24 @@ void out_json_line(const json_t *o)
     fflush(stdout);
 }
 
+// Why writing failed; 0: it did not. When it was long ago, errno has meanwhile been somebody
+// else's: one more byte, of an output that is incomplete anyway, tells it again.
+static int write_error(void)
+{
+    if (fflush(stdout) != 0)
+        return errno;
+    if (!ferror(stdout))
+        return 0;
+    return write(fileno(stdout), "\n", 1) < 0 ? errno : EIO;
+}
+
 int out_finish(int status)
 {
-    if (fflush(stdout) == 0 && !ferror(stdout))
+    const int error = write_error();
+    if (error == 0 || error == EPIPE) // a reader that has seen enough is no failure of ours
         return status;
-    if (errno != EPIPE) // a reader that has seen enough is no failure of ours
-        fprintf(stderr, "gonio: standard output: %s\n", strerror(errno));
-    return errno == EPIPE ? status : EXIT_FAILED;
+    fprintf(stderr, "gonio: standard output: %s\n", strerror(error));
+    return EXIT_FAILED;
 }
 
 // --- tables -------------------------------------------------------------------------------------

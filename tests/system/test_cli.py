@@ -4,10 +4,11 @@ import csv
 import io
 import json
 import math
+import subprocess
 
 import pytest
 
-from conftest import ROOT, SMALL, gonio
+from conftest import BUILD, ROOT, SMALL, gonio
 
 GOLDEN = ROOT / "tests" / "golden"
 
@@ -231,3 +232,16 @@ def test_list_of_an_empty_folder(tmp_path):
     r = gonio("list", "--dir", tmp_path)
     assert r.returncode == 0 and r.stdout == "" and "no campaigns" in r.stderr
     assert json.loads(gonio("list", "--dir", tmp_path, "--json").stdout) == []
+
+
+@pytest.mark.parametrize("args", [
+    ("fit", GOLDEN / "golden_fit_a.csv", "--theta-i-max", "10"),
+    ("fit", GOLDEN / "golden_fit_a.csv", "--theta-i-max", "10", "--json"),
+    ("plan", ROOT / "configs" / "paper.cfg"),
+    ("plan", ROOT / "configs" / "paper.cfg", "--json"),
+    ("help",),
+])
+def test_a_full_disk_is_named(args):
+    with open("/dev/full", "w") as full:
+        r = subprocess.run([BUILD / "gonio", *args], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert r.returncode == 1 and "gonio: standard output: No space left on device\n" in r.stderr, r.stderr
