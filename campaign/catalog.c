@@ -111,8 +111,8 @@ static int scan(const char *directory, void (*each)(void *ctx, const char *name)
     return highest;
 }
 
-int catalog_create(const char *directory, const struct store_new *what, struct store **ret_store,
-                   int *ret_id, struct gon_error *err)
+int catalog_create(const char *directory, int above, const struct store_new *what,
+                   struct store **ret_store, int *ret_id, struct gon_error *err)
 {
     char slug[MOST_SLUG + 1], path[CATALOG_PATH];
     int rc = catalog_make_directory(directory, err);
@@ -121,7 +121,7 @@ int catalog_create(const char *directory, const struct store_new *what, struct s
     int fd = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0 || flock(fd, LOCK_EX) < 0)
         rc = gon_fail(err, GON_E_STORE, "%s: %s", directory, strerror(errno));
-    int id = scan(directory, NULL, NULL) + 1;
+    int highest = scan(directory, NULL, NULL), id = (highest > above ? highest : above) + 1;
     slug_of(what->config->name, slug);
     if (rc >= 0 && snprintf(path, sizeof path, "%s/%04d%s%s%s", directory, id, *slug ? "-" : "",
                             slug, STORE_SUFFIX) >= (int)sizeof path)

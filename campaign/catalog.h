@@ -27,9 +27,10 @@ int catalog_directory(const char *wanted, char *ret_directory, size_t size, stru
 // Makes the directory (and its parents) when it is missing.
 int catalog_make_directory(const char *directory, struct gon_error *err);
 
-// A new campaign file with the next number, open for writing.
-int catalog_create(const char *directory, const struct store_new *what, struct store **ret_store,
-                   int *ret_id, struct gon_error *err);
+// A new campaign file with the next number, open for writing. The number is above all that are
+// there, and above one (0: any) that somebody remembers of files that are gone.
+int catalog_create(const char *directory, int above, const struct store_new *what,
+                   struct store **ret_store, int *ret_id, struct gon_error *err);
 
 // What is there, by rising number; returns how many, free *ret_entries. A missing directory is
 // empty. A file that cannot be read is listed with its problem.

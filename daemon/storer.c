@@ -21,6 +21,7 @@ struct storer {
     struct store *store; // open for writing; NULL: none
     int run;
     char state[16]; // the last written
+    int highest;    // number that anybody was told: the next campaign's is above it
 };
 
 struct storer *storer_new(const struct storer_links *links)
@@ -63,11 +64,12 @@ static enum run_state state_of(const char *name)
     return RUN_STOPPED; // also of a daemon that died, or before it ever ran: it can go on
 }
 
-static struct run *run_of(const struct catalog_entry *e)
+static struct run *run_of(struct storer *s, const struct catalog_entry *e)
 {
     struct run *run = calloc(1, sizeof *run);
     if (!run)
         return NULL;
+    s->highest = e->id > s->highest ? e->id : s->highest;
     const double unknown = (double)NAN;
     *run = (struct run){.id = e->id,
                         .state = state_of(e->state),
@@ -93,7 +95,7 @@ static void list(struct storer *s)
     int count = catalog_list(s->links.directory, &entries, &end->err);
     for (int i = 0; i < count; i++) {
         struct note *n = note_new(NOTE_LISTED);
-        n->thing = entries[i].id > 0 ? run_of(&entries[i]) : NULL;
+        n->thing = entries[i].id > 0 ? run_of(s, &entries[i]) : NULL;
         if (n->thing)
             note_post(s->links.to_main, n);
         else
@@ -125,7 +127,7 @@ static int create_file(struct storer *s, const struct campaign_config *config, c
         return rc;
     struct store_new what = {config, n->text,  n->name, s->links.bench, s->links.bench_text,
                              &plan,  utc_ms(s)};
-    rc = catalog_create(s->links.directory, &what, &store, &id, err);
+    rc = catalog_create(s->links.directory, s->highest, &what, &store, &id, err);
     if (rc == 0)
         snprintf(ret_path, size, "%s", store_path(store));
     store_close(store, NULL); // opened again when its turn comes
@@ -143,7 +145,7 @@ static void answer_known(struct storer *s, const struct note *question, int rc,
     if (rc < 0)
         n->err = *err;
     else if (catalog_read(path, &e) == 0 && (e.id = catalog_id(path)) > 0)
-        n->thing = run_of(&e);
+        n->thing = run_of(s, &e);
     if (rc == 0 && !n->thing)
         gon_fail(&n->err, GON_E_INPUT, "%s: not a numbered campaign file; see: gonio list", path);
     note_post(s->links.to_main, n);

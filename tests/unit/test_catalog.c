@@ -27,7 +27,7 @@ static int end(void **state)
     return 0;
 }
 
-static struct store *created(const char *name, int *ret_id)
+static struct store *created_above(int above, const char *name, int *ret_id)
 {
     char text[300];
     snprintf(text, sizeof text,
@@ -40,9 +40,14 @@ static struct store *created(const char *name, int *ret_id)
     struct store *s = NULL;
     assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
     const struct store_new what = {&config, text, "c.cfg", &bench, FIXTURE_BENCH, &plan, 1000};
-    assert_int_equal(catalog_create(folder.path, &what, &s, ret_id, NULL), 0);
+    assert_int_equal(catalog_create(folder.path, above, &what, &s, ret_id, NULL), 0);
     plan_clear(&plan);
     return s;
+}
+
+static struct store *created(const char *name, int *ret_id)
+{
+    return created_above(0, name, ret_id);
 }
 
 static void numbers_rise_and_names_are_plain(void **state)
@@ -63,6 +68,10 @@ static void numbers_rise_and_names_are_plain(void **state)
     unlink(fixture_path(&folder, "0002-etc.gonio", file, sizeof file));
     store_close(created("x", &id), NULL);
     assert_int_equal(id, 4); // numbers are not given out twice while a later one exists
+    store_close(created_above(2, "y", &id), NULL);
+    assert_int_equal(id, 5);
+    store_close(created_above(8, "z", &id), NULL);
+    assert_int_equal(id, 9);
     assert_int_equal(catalog_id("/a/b/0012-x.gonio"), 12);
     assert_int_equal(catalog_id("12345.gonio"), 12345);
     assert_int_equal(catalog_id("12-x.gonio"), 0);

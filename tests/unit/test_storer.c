@@ -332,6 +332,30 @@ static void only_files_of_the_own_folder_are_taken(void **state)
     free(run);
 }
 
+// The daemon still knows a run whose file was removed.
+static void a_number_is_given_once_in_the_daemons_life(void **state)
+{
+    struct world *w = *state;
+    struct run *first = create(w);
+    assert_int_equal(first->id, 1);
+    unlink(first->path);
+    struct run *second = create(w);
+    assert_int_equal(second->id, 2);
+
+    char listed[120];
+    snprintf(listed, sizeof listed, "%s/0041-core-test.gonio", w->folder);
+    assert_int_equal(rename(second->path, listed), 0);
+    storer_step(w->storer, note_of(NOTE_LIST, 0, NULL, NULL));
+    note_free(expect(w->to_main, NOTE_LISTED));
+    note_free(expect(w->to_main, NOTE_LISTED));
+    unlink(listed);
+    struct run *third = create(w);
+    assert_int_equal(third->id, 42);
+    free(first);
+    free(second);
+    free(third);
+}
+
 static struct note *fit_wanted(const struct run *run, int sweep)
 {
     struct note *n = note_of(NOTE_FIT_WANTED, run->id, run->path, NULL);
@@ -409,6 +433,7 @@ int main(void)
         TEST(another_bench_is_refused),
         TEST(campaigns_are_listed_with_their_states),
         TEST(only_files_of_the_own_folder_are_taken),
+        TEST(a_number_is_given_once_in_the_daemons_life),
         TEST(readings_of_a_known_surface_give_its_parameters),
         TEST(a_fit_that_cannot_be_made_says_so),
     };
