@@ -291,3 +291,12 @@ int catalog_resolve(const char *directory, const char *file, char *ret_path, siz
                     "%s: no such file, and no campaign of that %s in %s; see: gonio list", file,
                     q.id ? "number" : "name", directory);
 }
+
+int catalog_find(const char *directory, int id, char *ret_path, size_t size, struct gon_error *err)
+{
+    struct search q = {.directory = directory, .id = id};
+    scan(directory, look, &q);
+    if (*q.best)
+        return put_path(ret_path, size, err, q.best, "");
+    return gon_fail(err, GON_E_INPUT, "there is no run %d in %s; see: gonio list", id, directory);
+}

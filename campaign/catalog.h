@@ -41,3 +41,5 @@ int catalog_id(const char *path); // of its name; 0 when it has none
 // FILE as a person types it: a path, a number, or a campaign's name (the newest of that name).
 int catalog_resolve(const char *directory, const char *file, char *ret_path, size_t size,
                     struct gon_error *err);
+// The file of a number, 1 or more. GON_E_INPUT: there is none.
+int catalog_find(const char *directory, int id, char *ret_path, size_t size, struct gon_error *err);

@@ -149,7 +149,8 @@ const struct verb verb_resume = {"resume",
                                  "Without RUN, goes on with the run that is paused. RUN is a "
                                  "number that gonio list shows, or a campaign\n"
                                  "file: it is queued again and goes on with its first point that "
-                                 "has no accepted reading. Follows it as\n"
+                                 "has no accepted reading. A file that is\n"
+                                 "damaged or that another process writes is refused. Follows it as "
                                  "gonio run does.\n",
                                  run_rows,
                                  run_resume};

@@ -81,6 +81,13 @@ char *api_complaints(const char *text)
     return body;
 }
 
+char *api_no_run(int run)
+{
+    char path[40];
+    snprintf(path, sizeof path, "/api/v1/runs/%d", run);
+    return http_error("there is no such run", path, "see: gonio list");
+}
+
 static struct http_reply failed(const struct gon_error *err)
 {
     return reply(api_status(err->code), api_error(err->code, err->text));
@@ -128,10 +135,14 @@ static int run_number(const char *text)
 
 static struct http_reply get_run(const struct call *c)
 {
-    const struct run *run = queue_run(hub_queue(c->hub), run_number(c->rest));
-    if (!run)
+    const int id = run_number(c->rest);
+    const struct run *run = queue_run(hub_queue(c->hub), id);
+    if (run)
+        return reply(200, view_text(view_run(run, true)));
+    if (id == 0)
         return fail(404, "there is no such run", c->request->path, "see: gonio list");
-    return reply(200, view_text(view_run(run, true)));
+    hub_find(c->hub, id, c->ticket);
+    return reply(HTTP_LATER, NULL);
 }
 
 static struct http_reply get_events(const struct call *c)
@@ -154,9 +165,10 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
         return fail(400, "\"resume\" is neither a run's number nor a path", NULL,
                     "see: gonio list");
     uint64_t event_id = hub_event_id(c->hub);
-    if (hub_submit(c->hub, (int)id, &err) < 0)
+    int rc = hub_submit(c->hub, (int)id, c->ticket, &err);
+    if (rc < 0)
         return failed(&err);
-    return reply(201, hub_submitted(c->hub, (int)id, event_id));
+    return rc ? reply(201, hub_submitted(c->hub, (int)id, event_id)) : reply(HTTP_LATER, NULL);
 }
 
 static struct http_reply create_run(const struct call *c, json_t *body)

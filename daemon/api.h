@@ -19,3 +19,4 @@ struct http_reply api_request(void *hub, const struct http_request *request, uin
 int api_status(int gon_code);                 // the HTTP status of an error
 char *api_error(int gon_code, const char *text); // its body; a text "file:line: what" gives where
 char *api_complaints(const char *text); // the same of a configuration's complaints, as they are
+char *api_no_run(int run);

@@ -238,14 +238,36 @@ void hub_submit_path(struct hub *h, const char *path, uint64_t ticket)
     note_post(h->store_box, n);
 }
 
-int hub_submit(struct hub *h, int run, struct gon_error *err)
+static bool is_paused(const struct hub *h, int run)
 {
     const struct run *active = queue_active(h->queue);
-    if (active && active->id == run && active->state == RUN_PAUSED) {
+    return active && active->id == run && active->state == RUN_PAUSED;
+}
+
+int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err)
+{
+    const struct run *known = queue_run(h->queue, run);
+    if (is_paused(h, run)) {
         int rc = hub_resume(h, err);
-        return rc < 0 ? rc : GON_OK;
+        return rc < 0 ? rc : 1;
     }
-    return queue_submit(h->queue, run, err);
+    int rc = known ? queue_may_submit(h->queue, run, err) : GON_OK;
+    if (rc < 0)
+        return rc;
+    struct note *n = note_new(NOTE_LOOK);
+    n->ticket = ticket;
+    n->run = run;
+    n->name = note_text(known ? known->path : NULL);
+    note_post(h->store_box, n);
+    return 0;
+}
+
+void hub_find(struct hub *h, int run, uint64_t ticket)
+{
+    struct note *n = note_new(NOTE_FIND);
+    n->ticket = ticket;
+    n->run = run;
+    note_post(h->store_box, n);
 }
 
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
@@ -284,12 +306,29 @@ int hub_resume(struct hub *h, struct gon_error *err)
 
 // --- what the workers say ------------------------------------------------------------------------
 
+static int submit_known(struct hub *h, int run, struct gon_error *err)
+{
+    if (!is_paused(h, run))
+        return queue_submit(h->queue, run, err);
+    int rc = hub_resume(h, err);
+    return rc < 0 ? rc : GON_OK;
+}
+
+static void found(struct hub *h, const struct note *n)
+{
+    const struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
+    if (run)
+        http_answer(h->http, n->ticket, 200, view_text(view_run(run, true)));
+    else
+        http_answer(h->http, n->ticket, 404, api_no_run(n->run));
+}
+
 static void known(struct hub *h, struct note *n)
 {
     struct gon_error err = n->err;
     uint64_t event_id = hub_event_id(h);
     struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
-    int rc = run ? hub_submit(h, run->id, &err) : (int)err.code;
+    int rc = run ? submit_known(h, run->id, &err) : (int)err.code;
     if (rc == 0) {
         http_answer(h->http, n->ticket, 201, hub_submitted(h, run->id, event_id));
     } else {
@@ -342,6 +381,7 @@ static void take(struct hub *h, struct note *n)
             log_say(h->options.log, LOG_WARN, "store", "%s", n->err.text);
         break;
     case NOTE_KNOWN: known(h, n); break;
+    case NOTE_FOUND: found(h, n); break;
     case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
     case NOTE_FITTED: fitted(h, n); break;
     case NOTE_CLOSED: queue_closed(h->queue, n->run, n->err.code ? &n->err : NULL); break;

@@ -50,9 +50,11 @@ struct hub_status {
 void hub_status(const struct hub *h, struct hub_status *ret_status);
 const struct queue *hub_queue(const struct hub *h);
 void hub_create(struct hub *h, const char *config, const char *name, uint64_t ticket);
-// The run that is paused goes on; any other one is queued. GON_E_REFUSED, GON_E_INPUT.
-int hub_submit(struct hub *h, int run, struct gon_error *err);
+// 1: the run was paused and goes on. 0: its file is looked at, known to the queue or not, and the
+// ticket is answered when it is queued or why it cannot be. GON_E_REFUSED: as queue_submit.
+int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err);
 void hub_submit_path(struct hub *h, const char *path, uint64_t ticket);
+void hub_find(struct hub *h, int run, uint64_t ticket); // one that the queue does not know
 // Stops in any case; false: 32 tickets wait for the end of a stop already, and this one will not be
 // answered.
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket);

@@ -15,7 +15,8 @@ enum note_kind {
     // to the store thread
     NOTE_LIST,    // which campaigns are there
     NOTE_CREATE,  // ticket, text: config, name: of its file: make a campaign file
-    NOTE_LOOK,    // ticket, name: path: what is this campaign
+    NOTE_LOOK,    // ticket, name: path, or run: can this campaign go on
+    NOTE_FIND,    // ticket, run: is there such a campaign
     NOTE_OPEN,    // run, name: path: for writing
     NOTE_READING, // run, sequence, thing: struct store_reading
     NOTE_EVENT,   // run, level, source, text
@@ -32,6 +33,7 @@ enum note_kind {
     // to the main thread
     NOTE_LISTED,   // thing: struct run (one a note); NULL: that was all; err
     NOTE_KNOWN,    // ticket, thing: struct run; NULL: err, and text: all complaints
+    NOTE_FOUND,    // ticket, run, thing: struct run; NULL: there is none
     NOTE_OPENED,   // run, thing: struct run_material; NULL: err
     NOTE_FITTED,   // run, sweep, last, text: JSON; NULL: err
     NOTE_CLOSED,   // run, err

@@ -119,9 +119,9 @@ static void next(struct queue *q)
     q->ports.open(q->ports.ctx, q->active);
 }
 
-int queue_submit(struct queue *q, int id, struct gon_error *err)
+int queue_may_submit(const struct queue *q, int id, struct gon_error *err)
 {
-    struct run *run = find(q, id);
+    const struct run *run = find(q, id);
     if (q->ending)
         return gon_fail(err, GON_E_REFUSED, "the daemon is ending; start it again");
     if (!run)
@@ -131,6 +131,15 @@ int queue_submit(struct queue *q, int id, struct gon_error *err)
                         run_state_name(run->state));
     if (run->state == RUN_DONE)
         return gon_fail(err, GON_E_REFUSED, "run %d is done; see: gonio show %d", id, id);
+    return GON_OK;
+}
+
+int queue_submit(struct queue *q, int id, struct gon_error *err)
+{
+    struct run *run = find(q, id);
+    int rc = queue_may_submit(q, id, err);
+    if (rc < 0)
+        return rc;
     q->waiting[q->waiting_count++] = id; // there is room for every known run
     run->fits_open = 0;
     run->fit_failed = false;

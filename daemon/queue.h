@@ -56,6 +56,8 @@ struct run *queue_know(struct queue *q, const struct run *run);
 // Queues a known run. GON_E_INPUT: no such run; GON_E_REFUSED: it is done, is queued or has the
 // bench already, or the daemon is ending.
 int queue_submit(struct queue *q, int id, struct gon_error *err);
+// Whether it would: the same errors.
+int queue_may_submit(const struct queue *q, int id, struct gon_error *err);
 
 // Ends the run that has the bench and empties the queue; false when there is nothing to stop.
 bool queue_stop(struct queue *q, const char *why);

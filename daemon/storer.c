@@ -135,19 +135,31 @@ static int create_file(struct storer *s, const struct campaign_config *config, c
     return rc;
 }
 
-static void answer_known(struct storer *s, const struct note *question, int rc,
-                         const struct gon_error *err, const char *path, char *complaints)
+static int read_entry(const char *path, struct catalog_entry *ret_entry, struct gon_error *err)
 {
-    struct catalog_entry e;
-    struct note *n = note_new(NOTE_KNOWN);
-    n->ticket = question->ticket;
-    n->text = complaints;
+    int rc = catalog_read(path, ret_entry);
     if (rc < 0)
+        return gon_fail(err, (enum gon_code)rc, "%s", ret_entry->problem);
+    if (ret_entry->id <= 0)
+        return gon_fail(err, GON_E_INPUT, "%s: not a numbered campaign file; see: gonio list",
+                        path);
+    return GON_OK;
+}
+
+// entry NULL: it could not be made or found, as err says.
+static void answer_known(struct storer *s, const struct note *question, enum note_kind kind,
+                         const struct catalog_entry *entry, const struct gon_error *err,
+                         char *complaints)
+{
+    struct note *n = note_new(kind);
+    n->ticket = question->ticket;
+    n->run = question->run;
+    n->text = complaints;
+    n->thing = entry ? run_of(s, entry) : NULL;
+    if (!entry)
         n->err = *err;
-    else if (catalog_read(path, &e) == 0 && (e.id = catalog_id(path)) > 0)
-        n->thing = run_of(s, &e);
-    if (rc == 0 && !n->thing)
-        gon_fail(&n->err, GON_E_INPUT, "%s: not a numbered campaign file; see: gonio list", path);
+    else if (!n->thing)
+        gon_fail(&n->err, GON_E_SYSTEM, "store: out of memory");
     note_post(s->links.to_main, n);
 }
 
@@ -158,32 +170,11 @@ static void create(struct storer *s, const struct note *n)
     struct gon_error err = {GON_E_INPUT, "the campaign is wrong"};
     int rc =
         campaign_config_parse(n->text, n->name, (struct cfg_sink){add_line, &complaints}, &config);
+    struct catalog_entry e;
     if (rc == 0)
         rc = create_file(s, &config, n, path, sizeof path, &err);
-    answer_known(s, n, rc, &err, path, complaints);
-}
-
-// Only files of our own directory: a number elsewhere would be somebody else's.
-static void look(struct storer *s, const struct note *n)
-{
-    struct gon_error err;
-    char path[CATALOG_PATH], folder[CATALOG_PATH];
-    int rc = catalog_resolve(s->links.directory, n->name, path, sizeof path, &err);
-    if (rc == 0) {
-        snprintf(folder, sizeof folder, "%s", path);
-        char *slash = strrchr(folder, '/'), *real = NULL,
-             *ours = realpath(s->links.directory, NULL);
-        if (slash)
-            *slash = 0;
-        real = realpath(slash ? folder : ".", NULL);
-        if (!real || !ours || strcmp(real, ours))
-            rc =
-                gon_fail(&err, GON_E_INPUT, "%s is not in the daemon's folder; copy it to %s first",
-                         path, s->links.directory);
-        free(real);
-        free(ours);
-    }
-    answer_known(s, n, rc, &err, path, NULL);
+    rc = rc < 0 ? rc : read_entry(path, &e, &err);
+    answer_known(s, n, NOTE_KNOWN, rc < 0 ? NULL : &e, &err, complaints);
 }
 
 // --- the campaign that is measured ---------------------------------------------------------------
@@ -236,37 +227,45 @@ static int read_opening(struct store *store, struct run_material *m, struct gon_
     return GON_OK;
 }
 
-static int read_material(struct storer *s, struct run_material *m, struct gon_error *err)
+static int read_material(const struct storer *s, struct store *store, struct run_material *m,
+                         struct gon_error *err)
 {
     struct bench_config then;
-    int rc = store_read_config(s->store, &m->config, err);
-    rc = rc < 0 ? rc : store_read_bench(s->store, &then, err);
+    int rc = store_read_config(store, &m->config, err);
+    rc = rc < 0 ? rc : store_read_bench(store, &then, err);
     rc = rc < 0 ? rc : same_bench(&then, s->links.bench, err);
-    rc = rc < 0 ? rc : store_read_plan(s->store, &m->plan, err);
-    return rc < 0 ? rc : read_opening(s->store, m, err);
+    rc = rc < 0 ? rc : store_read_plan(store, &m->plan, err);
+    return rc < 0 ? rc : read_opening(store, m, err);
+}
+
+static int open_file(const struct storer *s, const char *path, struct store **ret_store,
+                     struct run_material **ret_material, struct gon_error *err)
+{
+    struct store *store = NULL;
+    struct run_material *m = calloc(1, sizeof *m);
+    int rc = m ? store_open(path, STORE_WRITE, &store, err)
+               : gon_fail(err, GON_E_SYSTEM, "store: out of memory");
+    rc = rc < 0 ? rc : read_material(s, store, m, err);
+    if (rc < 0) {
+        store_close(store, NULL);
+        run_material_free(m);
+        return rc;
+    }
+    *ret_store = store;
+    *ret_material = m;
+    return GON_OK;
 }
 
 static void open_run(struct storer *s, const struct note *n)
 {
     struct note *answer = note_new(NOTE_OPENED);
-    struct run_material *m = calloc(1, sizeof *m);
+    struct run_material *m = NULL;
     answer->run = n->run;
-    int rc = m ? store_open(n->name, STORE_WRITE, &s->store, &answer->err)
-               : gon_fail(&answer->err, GON_E_SYSTEM, "store: out of memory");
-    if (rc == 0) {
-        rc = read_material(s, m, &answer->err);
-        if (rc < 0) {
-            store_close(s->store, NULL);
-            s->store = NULL;
-        }
-    }
-    if (rc == 0) {
+    if (open_file(s, n->name, &s->store, &m, &answer->err) == 0) {
         s->run = n->run;
         *s->state = 0;
         answer->thing = m;
         answer->drop = run_material_free;
-    } else {
-        run_material_free(m);
     }
     note_post(s->links.to_main, answer);
 }
@@ -326,12 +325,69 @@ static void close_run(struct storer *s, const struct note *n)
     note_post(s->links.to_main, answer);
 }
 
+// --- what was measured before --------------------------------------------------------------------
+
+// Only files of our own directory: a number elsewhere would be somebody else's.
+static int own_file(const struct storer *s, const char *name, char *path, size_t size,
+                    struct gon_error *err)
+{
+    char folder[CATALOG_PATH];
+    int rc = catalog_resolve(s->links.directory, name, path, size, err);
+    if (rc < 0)
+        return rc;
+    snprintf(folder, sizeof folder, "%s", path);
+    char *slash = strrchr(folder, '/');
+    if (slash)
+        *slash = 0;
+    char *real = realpath(slash ? folder : ".", NULL), *ours = realpath(s->links.directory, NULL);
+    if (!real || !ours || strcmp(real, ours))
+        rc = gon_fail(err, GON_E_INPUT, "%s is not in the daemon's folder; copy it to %s first",
+                      path, s->links.directory);
+    free(real);
+    free(ours);
+    return rc;
+}
+
+// Whether it could be opened when its turn comes. While another one is measured only what takes no
+// time is tried, because that one's readings wait here.
+static int try_file(const struct storer *s, const struct catalog_entry *e, struct gon_error *err)
+{
+    struct store *store;
+    struct run_material *m;
+    if ((s->store && s->run == e->id) || !strcmp(e->state, run_state_name(RUN_DONE)))
+        return GON_OK; // the queue knows what to say
+    if (e->writer_pid)
+        return gon_fail(err, GON_E_REFUSED, "%s: in use by process %d", e->path, e->writer_pid);
+    if (s->store)
+        return GON_OK;
+    int rc = open_file(s, e->path, &store, &m, err);
+    if (rc < 0)
+        return rc;
+    store_close(store, NULL);
+    run_material_free(m);
+    return GON_OK;
+}
+
+static void look(struct storer *s, const struct note *n)
+{
+    struct catalog_entry e;
+    struct gon_error err;
+    char path[CATALOG_PATH];
+    int rc = n->name ? own_file(s, n->name, path, sizeof path, &err)
+                     : catalog_find(s->links.directory, n->run, path, sizeof path, &err);
+    rc = rc < 0 ? rc : read_entry(path, &e, &err);
+    rc = rc < 0 || n->letter.kind == NOTE_FIND ? rc : try_file(s, &e, &err);
+    answer_known(s, n, n->letter.kind == NOTE_FIND ? NOTE_FOUND : NOTE_KNOWN, rc < 0 ? NULL : &e,
+                 &err, NULL);
+}
+
 void storer_step(struct storer *s, struct note *n)
 {
     switch ((enum note_kind)n->letter.kind) {
     case NOTE_LIST: list(s); break;
     case NOTE_CREATE: create(s, n); break;
-    case NOTE_LOOK: look(s, n); break;
+    case NOTE_LOOK:
+    case NOTE_FIND: look(s, n); break;
     case NOTE_OPEN: open_run(s, n); break;
     case NOTE_READING: append_reading(s, n); break;
     case NOTE_EVENT:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """goniod over the simulated bench: a campaign from its start to its fit, stop and resume, ends."""
+import fcntl
 import json
 import math
 import os
@@ -199,6 +200,44 @@ def test_ctrl_c_ends_the_following_and_not_the_run(daemon, tmp_path):
     r = daemon.gonio("run", config, "--detach", "--json")
     assert r.returncode == 0 and json.loads(r.stdout)["state"] in ("queued", "preparing", "running")
     assert daemon.gonio("stop").returncode == 0
+
+
+def test_a_file_copied_into_the_folder_is_known_by_its_number(daemon):
+    reply = daemon.submit(LONG, "long.cfg")
+    assert daemon.gonio("stop").returncode == 0
+    number = reply["run"] + 20
+    os.link(reply["file"], daemon.directory / f"{number:04}-copy.gonio")
+    assert daemon.request("GET", f"/api/v1/runs/{number}")[1]["name"] == "long"
+    number += 1
+    os.rename(daemon.directory / f"{number - 1:04}-copy.gonio", daemon.directory / f"{number:04}-copy.gonio")
+    r = daemon.gonio("resume", number, "--detach", "--json")
+    assert r.returncode == 0, r.stderr
+    assert json.loads(r.stdout)["run"] == number
+    assert daemon.gonio("stop").returncode == 0
+    os.unlink(daemon.directory / f"{number:04}-copy.gonio")
+
+
+def test_a_file_that_cannot_go_on_is_refused_at_once(daemon, tmp_path):
+    reply = daemon.submit(LONG, "long.cfg")
+    run, file = reply["run"], reply["file"]
+    assert daemon.gonio("stop").returncode == 0
+    with open(file + "-lock", "w") as lock:
+        lock.write("4711\n")
+        lock.flush()
+        fcntl.lockf(lock, fcntl.LOCK_EX)
+        r = daemon.gonio("resume", run, "--detach")
+        assert r.returncode == 4 and "in use by process 4711" in r.stderr, r
+    os.unlink(file + "-lock")
+    os.truncate(file, 20000)
+    r = daemon.gonio("resume", run, "--detach")
+    assert r.returncode == 1 and file in r.stderr, r
+    os.truncate(file, 0)
+    r = daemon.gonio("resume", run, "--detach")
+    assert r.returncode == 2 and "not a campaign file" in r.stderr, r
+    os.unlink(file)
+    r = daemon.gonio("resume", run)
+    assert r.returncode == 2 and "No such file" in r.stderr, r
+    assert daemon.status()["run"] is None
 
 
 # --- the daemon's own beginning and end ---------------------------------------------------------------

@@ -332,6 +332,74 @@ static void only_files_of_the_own_folder_are_taken(void **state)
     free(run);
 }
 
+static struct note *look(struct world *w, enum note_kind question, int run, const char *name)
+{
+    storer_step(w->storer, note_of(question, run, name, NULL));
+    return expect(w->to_main, question == NOTE_LOOK ? NOTE_KNOWN : NOTE_FOUND);
+}
+
+static void looking_fails(struct world *w, int run, const char *name, int code, const char *says)
+{
+    struct note *n = look(w, NOTE_LOOK, run, name);
+    assert_null(n->thing);
+    assert_int_equal(n->err.code, code);
+    if (!strstr(n->err.text, says))
+        fail_msg("'%s' does not say '%s'", n->err.text, says);
+    note_free(n);
+}
+
+static void finds(struct world *w, enum note_kind question, int run, const char *name)
+{
+    struct note *n = look(w, question, run, name);
+    if (!n->thing)
+        fail_msg("%s", n->err.text);
+    assert_int_equal(((struct run *)n->thing)->id, run);
+    note_free(n);
+}
+
+// Copied there while the daemon runs.
+static void a_number_is_looked_for_in_the_folder(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w);
+    char copy[120];
+    snprintf(copy, sizeof copy, "%s/0007-copy.gonio", w->folder);
+    assert_int_equal(rename(run->path, copy), 0);
+    finds(w, NOTE_LOOK, 7, NULL);
+    finds(w, NOTE_LOOK, 7, copy);
+    finds(w, NOTE_FIND, 7, NULL);
+    looking_fails(w, 1, NULL, GON_E_INPUT, "there is no run 1 in ");
+    struct note *n = look(w, NOTE_FIND, 1, NULL);
+    assert_null(n->thing);
+    note_free(n);
+    free(run);
+}
+
+static void what_cannot_go_on_is_seen_at_once(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w), *other = create(w);
+    struct store *held;
+    assert_int_equal(store_open(run->path, STORE_WRITE, &held, NULL), 0);
+    looking_fails(w, run->id, run->path, GON_E_REFUSED, "in use by process ");
+    struct run_material *m = open_run(w, other);
+    looking_fails(w, run->id, run->path, GON_E_REFUSED, "in use by process ");
+    finds(w, NOTE_LOOK, other->id, other->path); // held by the daemon itself
+    close_run(w, other->id, RUN_STOPPED);
+    store_close(held, NULL);
+    finds(w, NOTE_LOOK, run->id, run->path);
+    w->bench.distance_mm = 400;
+    looking_fails(w, run->id, NULL, GON_E_REFUSED, "distance 500 mm then, 400 now");
+    w->bench.distance_mm = 500;
+    assert_int_equal(truncate(run->path, 20000), 0);
+    looking_fails(w, run->id, NULL, GON_E_STORE, run->path);
+    assert_int_equal(truncate(run->path, 0), 0);
+    looking_fails(w, run->id, NULL, GON_E_INPUT, "not a campaign file");
+    run_material_free(m);
+    free(run);
+    free(other);
+}
+
 // The daemon still knows a run whose file was removed.
 static void a_number_is_given_once_in_the_daemons_life(void **state)
 {
@@ -433,6 +501,8 @@ int main(void)
         TEST(another_bench_is_refused),
         TEST(campaigns_are_listed_with_their_states),
         TEST(only_files_of_the_own_folder_are_taken),
+        TEST(a_number_is_looked_for_in_the_folder),
+        TEST(what_cannot_go_on_is_seen_at_once),
         TEST(a_number_is_given_once_in_the_daemons_life),
         TEST(readings_of_a_known_surface_give_its_parameters),
         TEST(a_fit_that_cannot_be_made_says_so),
