@@ -215,12 +215,11 @@ static int run_pause(const struct verb *verb, int argc, char **argv)
 {
     json_t *reply = NULL;
     int status = command(verb, argc, argv, "/api/v1/pause", &reply);
+    bool already = !strcmp(text_of(reply, "state"), "paused");
     if (reply)
-        fprintf(stderr,
-                "run %d pauses after the reading in progress; the laser goes off then. Go on with: "
-                "gonio "
-                "resume\n",
-                whole(reply, "run"));
+        fprintf(stderr, "run %d %s. Go on with: gonio resume\n", whole(reply, "run"),
+                already ? "stays paused"
+                        : "pauses after the reading in progress; the laser goes off then");
     json_decref(reply);
     return status;
 }
@@ -229,6 +228,7 @@ const struct verb verb_pause = {
     "pause",
     "",
     "hold the run, laser off, until gonio resume",
-    "Holds the run that has the bench after the reading in progress: laser off, axes still.\n",
+    "Holds the run that has the bench after the reading in progress: laser off, axes still. A run\n"
+    "that waits for a device would go on by itself; paused, it waits for gonio resume.\n",
     rows,
     run_pause};

@@ -35,6 +35,7 @@ struct hub {
     int64_t start_ns;
     uint64_t stops[MOST_STOPS]; // tickets that wait for the end of a stop
     int stop_count;
+    bool held; // somebody asked for the pause that the active run is in, or comes to
     bool ready_said, listed, ending, ended_said;
 };
 
@@ -88,6 +89,8 @@ static void changed(void *ctx, const struct run *run)
     publish(h, "state", view_run(run, false));
     if (run == queue_active(h->queue))
         keep_state(h, run);
+    if (run == queue_active(h->queue) || queue_idle(h->queue))
+        h->held = h->held && run->state == RUN_PAUSED;
     if (queue_idle(h->queue) && h->stop_count)
         answer_stopped(h, 200, view_run(run, false));
 }
@@ -280,28 +283,30 @@ bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
     return room;
 }
 
-static int to_active(struct hub *h, enum note_kind kind, bool paused, struct gon_error *err)
+static int to_active(struct hub *h, enum note_kind kind, unsigned states, struct gon_error *err)
 {
     const struct run *run = queue_active(h->queue);
     if (!run)
         return gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
-    bool right = paused ? run->state == RUN_PAUSED
-                        : run->state == RUN_RUNNING || run->state == RUN_PREPARING;
-    if (!right)
+    if (!(states & 1u << run->state))
         return gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
                         run_state_name(run->state));
     note_post(h->run_box, note_new(kind));
     return run->id;
 }
 
+// One that waits for a device would go on by itself: it can be held too, once.
 int hub_pause(struct hub *h, struct gon_error *err)
 {
-    return to_active(h, NOTE_PAUSE, false, err);
+    const unsigned waits = h->held ? 0 : 1u << RUN_PAUSED;
+    int rc = to_active(h, NOTE_PAUSE, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, err);
+    h->held = h->held || rc > 0;
+    return rc;
 }
 
 int hub_resume(struct hub *h, struct gon_error *err)
 {
-    return to_active(h, NOTE_RESUME, true, err);
+    return to_active(h, NOTE_RESUME, 1u << RUN_PAUSED, err);
 }
 
 // --- what the workers say ------------------------------------------------------------------------

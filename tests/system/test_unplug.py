@@ -36,3 +36,22 @@ def test_an_unplugged_wire_pauses_the_run_and_its_return_resumes_it(start_sim, s
 
     events.until_state(run, "done")
     assert not sim.control(do="state")["laser"]["emission"]
+
+
+def test_a_run_that_waits_for_a_device_can_be_held(start_sim, start_daemon):
+    sim = start_sim("--fast", "--seed", "5", "--set", "laser.warmup_s=0.05", "--set", "laser.temperatures_s=0")
+    daemon = start_daemon("--config", sim.folder / "goniod-tcp.cfg")
+    run = daemon.submit(PLAN, "unplugged.cfg")["run"]
+    events = daemon.follow(0)
+    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
+    assert sim.control(do="unplug", wire="detector-tcp")["ok"]
+    events.until_state(run, "paused")
+    r = daemon.gonio("pause")
+    assert r.returncode == 0 and r.stderr == f"run {run} stays paused. Go on with: gonio resume\n", r
+    held = events.until_state(run, "paused")
+    assert "by the operator" in held["text"]
+    assert sim.control(do="plug", wire="detector-tcp")["ok"]
+    assert daemon.gonio("pause").returncode == 4
+    assert daemon.status()["state"] == "paused"
+    assert daemon.gonio("resume", "--detach").returncode == 0
+    events.until_state(run, "running")
