@@ -20,10 +20,13 @@ enum {
     RETRY_MS = 500
 };
 #define AWAY_NS CLK_S(10) // how long the daemon may be away while it is followed
+#define GRACE_NS CLK_S(2) // for the answer to what was asked before an interrupt
 
 struct client {
     char socket[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
     CURL *curl;
+    int interrupt_fd;
+    int64_t interrupted_ns; // when it was seen first; 0: not yet
 };
 
 struct reply {
@@ -34,6 +37,8 @@ struct reply {
 int client_new(const char *socket, struct client **ret_client, struct gon_error *err)
 {
     struct client *c = calloc(1, sizeof *c);
+    if (c)
+        c->interrupt_fd = -1;
     int rc = !c         ? gon_fail(err, GON_E_SYSTEM, "out of memory")
              : !socket  ? paths_socket(c->socket, sizeof c->socket, err)
                         : paths_socket_fits(socket, err);
@@ -62,11 +67,21 @@ const char *client_socket(const struct client *c)
     return c->socket;
 }
 
+void client_interrupt_by(struct client *c, int fd)
+{
+    c->interrupt_fd = fd;
+}
+
 static int no_daemon(const struct client *c, CURLcode code, struct gon_error *err)
 {
     if (code == CURLE_COULDNT_CONNECT)
         return gon_fail(err, GON_E_GONE,
                         "no daemon at %s; start it: goniod --sim (or goniod --config goniod.cfg)",
+                        c->socket);
+    if (code == CURLE_ABORTED_BY_CALLBACK)
+        return gon_fail(err, GON_E_CANCELED,
+                        "interrupted; the daemon at %s has not answered, and may do it all the "
+                        "same; see: gonio status",
                         c->socket);
     return gon_fail(err, GON_E_GONE, "the daemon at %s does not answer: %s; see: gonio status",
                     c->socket, curl_easy_strerror(code));
@@ -136,6 +151,25 @@ static int understand(long status, const struct reply *r, json_t **ret_reply, st
     return rc;
 }
 
+static bool readable(int fd)
+{
+    struct pollfd p = {fd, POLLIN, 0};
+    return fd >= 0 && poll(&p, 1, 0) > 0;
+}
+
+// Called by libcurl at least once a second.
+static int give_up(void *ctx, curl_off_t a, curl_off_t b, curl_off_t c_, curl_off_t d)
+{
+    struct client *c = ctx;
+    (void)a, (void)b, (void)c_, (void)d;
+    if (!readable(c->interrupt_fd))
+        return 0;
+    const int64_t now_ns = clk_now_ns(clk_system());
+    if (!c->interrupted_ns)
+        c->interrupted_ns = now_ns;
+    return now_ns - c->interrupted_ns > GRACE_NS;
+}
+
 int client_request(struct client *c, const char *method, const char *path, const json_t *body,
                    json_t **ret_reply, struct gon_error *err)
 {
@@ -151,6 +185,9 @@ int client_request(struct client *c, const char *method, const char *path, const
     curl_easy_setopt(c->curl, CURLOPT_TIMEOUT, (long)REQUEST_S);
     curl_easy_setopt(c->curl, CURLOPT_WRITEFUNCTION, take_reply);
     curl_easy_setopt(c->curl, CURLOPT_WRITEDATA, &r);
+    curl_easy_setopt(c->curl, CURLOPT_NOPROGRESS, 0L);
+    curl_easy_setopt(c->curl, CURLOPT_XFERINFOFUNCTION, give_up);
+    curl_easy_setopt(c->curl, CURLOPT_XFERINFODATA, c);
     CURLcode code = curl_easy_perform(c->curl);
     long status = 0;
     curl_easy_getinfo(c->curl, CURLINFO_RESPONSE_CODE, &status);
@@ -191,12 +228,6 @@ static size_t take_stream(char *data, size_t one, size_t size, void *ctx)
         f->follower->trouble(f->follower->ctx, "the daemon is back");
     f->away = false;
     return sse_feed(f->sse, data, one * size) < 0 || f->enough ? 0 : one * size;
-}
-
-static bool readable(int fd)
-{
-    struct pollfd p = {fd, POLLIN, 0};
-    return fd >= 0 && poll(&p, 1, 0) > 0;
 }
 
 // One connection: until the follower has enough, an interrupt, or its end (ret_code, ret_status).

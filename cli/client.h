@@ -20,6 +20,10 @@ const char *client_socket(const struct client *c);
 int client_request(struct client *c, const char *method, const char *path,
                    const struct json_t *body, struct json_t **ret_reply, struct gon_error *err);
 
+// From now on, requests give up (GON_E_CANCELED) when fd is readable and 2 s later no answer is
+// there: what was asked for may then be done or not. -1: they wait.
+void client_interrupt_by(struct client *c, int fd);
+
 struct client_follower {
     void *ctx;
     bool (*event)(void *ctx, const struct json_t *event); // false: enough

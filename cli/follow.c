@@ -3,15 +3,13 @@
 
 #include "cli/client.h"
 #include "cli/fitview.h"
+#include "cli/interrupt.h"
 #include "cli/out.h"
 #include "cli/verb.h"
 
 #include <jansson.h>
 #include <math.h>
-#include <signal.h>
 #include <string.h>
-#include <sys/signalfd.h>
-#include <unistd.h>
 
 enum { BAR = 20 };
 
@@ -188,50 +186,28 @@ static int report_end(struct follow *f)
     return done && f->fit ? EXIT_OK : EXIT_FAILED;
 }
 
-// Ctrl-C arrives as a readable descriptor.
-static int interrupt_open(sigset_t *ret_before)
+int follow_run(const char *socket, const struct interrupt *i, const struct follow_run *what)
 {
-    sigset_t set;
-    sigemptyset(&set);
-    sigaddset(&set, SIGINT);
-    sigaddset(&set, SIGTERM);
-    sigprocmask(SIG_BLOCK, &set, ret_before);
-    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-}
-
-// A signal that came must not be delivered once more when the mask is lifted.
-static void interrupt_close(int fd)
-{
-    struct signalfd_siginfo info;
-    if (fd < 0)
-        return;
-    while (read(fd, &info, sizeof info) == (ssize_t)sizeof info)
-        continue;
-    close(fd);
-}
-
-int follow_run(struct client *c, int run, const char *file, const char *last_id, bool json)
-{
-    struct follow f = {.run = run, .file = file, .json = json, .live = !json && out_colour(stderr)};
+    struct follow f = {.run = what->run,
+                       .file = what->file,
+                       .json = what->json,
+                       .live = !what->json && out_colour(stderr)};
     struct client_follower follower = {&f, take_event, trouble};
+    struct client *c = NULL;
     struct gon_error err = {0};
-    sigset_t before;
-    int fd = interrupt_open(&before);
-    if (f.live)
+    int rc = client_new(socket, &c, &err), status;
+    if (rc == 0 && f.live)
         fprintf(stderr, "(Ctrl-C: stop watching, the run continues.  Stop the run: gonio stop)\n");
-    int rc = client_follow(c, last_id, fd, &follower, &err), status;
+    rc = rc < 0 ? rc : client_follow(c, what->last_id, i->fd, &follower, &err);
     clear_line(&f);
     if (rc == GON_E_CANCELED) {
         out_say("stopped watching; run %d goes on. Stop it: gonio stop. Watch it: gonio watch",
-                run);
+                f.run);
         status = EXIT_INTERRUPTED;
-    } else if (rc < 0) {
-        status = out_fail(&err);
     } else {
-        status = report_end(&f);
+        status = rc < 0 ? out_fail(&err) : report_end(&f);
     }
     json_decref(f.fit);
-    interrupt_close(fd);
-    sigprocmask(SIG_SETMASK, &before, NULL);
+    client_free(c);
     return status;
 }

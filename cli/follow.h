@@ -6,8 +6,15 @@
 
 #include <stdbool.h>
 
-struct client;
+struct interrupt;
 
-// Follows run from the events after last_id; file is where its readings go. Returns the exit
-// status: of the run when it ended, 130 after Ctrl-C, 3 when the daemon went away.
-int follow_run(struct client *c, int run, const char *file, const char *last_id, bool json);
+struct follow_run {
+    int run;
+    const char *file;    // where its readings go; "" unknown
+    const char *last_id; // of the event after which to begin
+    bool json;
+};
+
+// socket as in client_new. Returns the exit status: of the run when it ended, 130 after Ctrl-C, 3
+// when the daemon went away.
+int follow_run(const char *socket, const struct interrupt *i, const struct follow_run *what);

@@ -24,12 +24,20 @@ static const struct option_row rows[] = {
 json_t *remote_call(const struct remote_options *o, const char *method, const char *path,
                     const json_t *body, int *ret_status)
 {
+    return remote_call_until(o, -1, method, path, body, ret_status);
+}
+
+json_t *remote_call_until(const struct remote_options *o, int interrupt_fd, const char *method,
+                          const char *path, const json_t *body, int *ret_status)
+{
     struct client *c = NULL;
     struct gon_error err;
     json_t *reply = NULL;
     int rc = client_new(o->socket, &c, &err);
-    if (rc == 0)
+    if (rc == 0) {
+        client_interrupt_by(c, interrupt_fd);
         rc = client_request(c, method, path, body, &reply, &err);
+    }
     client_free(c);
     if (rc < 0)
         *ret_status = out_fail(&err);

@@ -20,3 +20,7 @@ struct remote_options {
 // One request: the reply, or the exit status in *ret_status and NULL after saying what went wrong.
 struct json_t *remote_call(const struct remote_options *o, const char *method, const char *path,
                            const struct json_t *body, int *ret_status);
+// The same, given up soon after interrupt_fd becomes readable (client_interrupt_by).
+struct json_t *remote_call_until(const struct remote_options *o, int interrupt_fd,
+                                 const char *method, const char *path, const struct json_t *body,
+                                 int *ret_status);

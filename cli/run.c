@@ -2,8 +2,8 @@
 // run and watch: a campaign given to the daemon, and its progress until it ends.
 #include "campaign/config.h"
 #include "cli/check.h"
-#include "cli/client.h"
 #include "cli/follow.h"
+#include "cli/interrupt.h"
 #include "cli/out.h"
 #include "cli/remote.h"
 #include "cli/verb.h"
@@ -33,34 +33,61 @@ static const struct option_row watch_rows[] = {
     VERB_OPTIONS_END,
 };
 
-// Follows with its own connection, from the event that the reply names.
-static int follow(const struct remote_options *o, const json_t *run, const json_t *event_id)
+static int number_of(const json_t *run)
 {
-    struct client *c = NULL;
-    struct gon_error err;
+    return (int)json_integer_value(json_object_get(run, "run"));
+}
+
+// Follows with its own connections, from the event that the reply names.
+static int follow(const struct remote_options *o, const struct interrupt *i, const json_t *run,
+                  const json_t *event_id)
+{
     char id[32];
     const char *file = json_string_value(json_object_get(run, "file"));
     snprintf(id, sizeof id, "%" JSON_INTEGER_FORMAT, json_integer_value(event_id));
-    if (client_new(o->socket, &c, &err) < 0)
-        return out_fail(&err);
-    int status = follow_run(c, (int)json_integer_value(json_object_get(run, "run")),
-                            file ? file : "", id, o->json);
-    client_free(c);
-    return status;
+    const struct follow_run what = {number_of(run), file ? file : "", id, o->json};
+    return follow_run(o->socket, i, &what);
 }
 
+// What is said of a run that the daemon took: while it is followed, detached, and after a Ctrl-C
+// that came before the following.
+struct wording {
+    const char *begun, *goes_on;
+};
+
 // Says that a run is under way and follows it unless that is not wanted. Takes the reply.
-static int begun(const struct options *o, json_t *reply, const char *what)
+static int begun(const struct options *o, const struct interrupt *i, json_t *reply,
+                 const struct wording *w)
 {
+    const int run = number_of(reply);
     int status = EXIT_OK;
     if (o->remote.json && o->detach)
         out_json_line(reply);
-    else if (!o->remote.json)
-        fprintf(stderr, "run %d %s%s\n", (int)json_integer_value(json_object_get(reply, "run")),
-                what, o->detach ? ". Watch it: gonio watch" : "");
-    if (!o->detach)
-        status = follow(&o->remote, reply, json_object_get(reply, "event_id"));
+    if (interrupt_came(i, 0)) {
+        out_say("run %d %s. Stop it: gonio stop. Watch it: gonio watch", run, w->goes_on);
+        status = EXIT_INTERRUPTED;
+    } else {
+        if (!o->remote.json)
+            fprintf(stderr, "run %d %s%s\n", run, w->begun,
+                    o->detach ? ". Watch it: gonio watch" : "");
+        if (!o->detach)
+            status = follow(&o->remote, i, reply, json_object_get(reply, "event_id"));
+    }
     json_decref(reply);
+    return status;
+}
+
+// A Ctrl-C from here on does not leave a run behind without a word. Takes the body.
+static int submit(const struct options *o, const char *path, json_t *body, const struct wording *w)
+{
+    struct interrupt i;
+    int status = EXIT_FAILED;
+    interrupt_open(&i);
+    json_t *reply = remote_call_until(&o->remote, i.fd, "POST", path, body, &status);
+    if (reply)
+        status = begun(o, &i, reply, w);
+    interrupt_close(&i);
+    json_decref(body);
     return status;
 }
 
@@ -74,12 +101,11 @@ static int run_run(const struct verb *verb, int argc, char **argv)
     struct campaign_config config;
     int status = check_campaign(file, &config, &text);
     json_t *body = status ? NULL : json_pack("{s:s, s:s}", "config", text, "name", file);
-    json_t *reply = body ? remote_call(&o.remote, "POST", "/api/v1/runs", body, &status) : NULL;
     free(text);
-    json_decref(body);
-    if (!reply)
+    if (!body)
         return status ? status : EXIT_FAILED;
-    return begun(&o, reply, "started");
+    return submit(&o, "/api/v1/runs", body,
+                  &(struct wording){"started", "was started and goes on"});
 }
 
 const struct verb verb_run = {
@@ -98,16 +124,19 @@ static int run_watch(const struct verb *verb, int argc, char **argv)
     int status = EXIT_OK;
     if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
         return EXIT_INPUT;
-    json_t *s = remote_call(&o.remote, "GET", "/api/v1/status", NULL, &status);
+    struct interrupt i;
+    interrupt_open(&i);
+    json_t *s = remote_call_until(&o.remote, i.fd, "GET", "/api/v1/status", NULL, &status);
     json_t *run = json_object_get(s, "run");
     if (json_is_object(run)) {
         if (!o.remote.json)
-            fprintf(stderr, "run %d %s\n", (int)json_integer_value(json_object_get(run, "run")),
+            fprintf(stderr, "run %d %s\n", number_of(run),
                     json_string_value(json_object_get(run, "state")));
-        status = follow(&o.remote, run, json_object_get(s, "event_id"));
+        status = follow(&o.remote, &i, run, json_object_get(s, "event_id"));
     } else if (s) {
         out_say("no run is active; start one: gonio run FILE.cfg, or see: gonio list");
     }
+    interrupt_close(&i);
     json_decref(s);
     return status;
 }
@@ -133,14 +162,12 @@ static int run_resume(const struct verb *verb, int argc, char **argv)
 {
     struct options o = {0};
     const char *operand;
-    int status = EXIT_OK, count = verb_take(verb, argc, argv, &o, &operand, 0, 1);
+    int count = verb_take(verb, argc, argv, &o, &operand, 0, 1);
     if (count < 0)
         return EXIT_INPUT;
-    json_t *body = count ? what_to_resume(operand) : NULL;
-    json_t *reply =
-        remote_call(&o.remote, "POST", count ? "/api/v1/runs" : "/api/v1/resume", body, &status);
-    json_decref(body);
-    return reply ? begun(&o, reply, "goes on") : status;
+    return submit(&o, count ? "/api/v1/runs" : "/api/v1/resume",
+                  count ? what_to_resume(operand) : NULL,
+                  &(struct wording){"goes on", "goes on"});
 }
 
 const struct verb verb_resume = {"resume",
