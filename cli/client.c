@@ -19,7 +19,6 @@ enum {
     SILENCE_S = 35, // the daemon pings every 10 s
     RETRY_MS = 500
 };
-#define AWAY_NS CLK_S(10) // how long the daemon may be away while it is followed
 #define GRACE_NS CLK_S(2) // for the answer to what was asked before an interrupt
 
 struct client {
@@ -225,7 +224,7 @@ static size_t take_stream(char *data, size_t one, size_t size, void *ctx)
     if (status != 200)
         return take_reply(data, one, size, &f->refusal);
     if (f->away)
-        f->follower->trouble(f->follower->ctx, "the daemon is back");
+        f->enough = !f->follower->back(f->follower->ctx);
     f->away = false;
     return sse_feed(f->sse, data, one * size) < 0 || f->enough ? 0 : one * size;
 }
@@ -308,11 +307,10 @@ int client_follow(struct client *c, const char *last_id, int interrupt_fd,
         if (rc < 0 || f.enough)
             break;
         if (!f.away) {
-            follower->trouble(follower->ctx,
-                              "the connection to the daemon broke; trying again for 10 s");
+            follower->away(follower->ctx);
             away_since_ns = clk_now_ns(clk_system());
             f.away = true;
-        } else if (was_away && clk_now_ns(clk_system()) - away_since_ns > AWAY_NS) {
+        } else if (was_away && clk_now_ns(clk_system()) - away_since_ns > CLIENT_AWAY_NS) {
             rc = gon_fail(err, GON_E_GONE,
                           "the daemon at %s went away; start it again, then see: gonio list",
                           c->socket);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cli/follow.h"
 
+#include "campaign/store.h"
+#include "cli/ask.h"
 #include "cli/client.h"
 #include "cli/fitview.h"
 #include "cli/interrupt.h"
@@ -9,16 +11,18 @@
 
 #include <jansson.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { BAR = 20 };
 
 struct follow {
     int run;
-    const char *file;
-    bool json, live, line_shown, ended;
+    bool json, live, line_shown;
+    bool ended, unknown, away; // unknown: to the daemon
     char state[32];
     json_t *fit; // the last one
+    struct ask *ask;
 };
 
 static double number(const json_t *o, const char *key)
@@ -138,76 +142,139 @@ static void take_fit(struct follow *f, const json_t *e)
     }
 }
 
-static bool is_end(const char *state)
+static void show(struct follow *f, const char *kind, const json_t *e)
 {
-    return !strcmp(state, "done") || !strcmp(state, "stopped") || !strcmp(state, "failed");
+    if (!strcmp(kind, "reading") && f->live)
+        show_reading(f, e);
+    else if (!strcmp(kind, "sweep"))
+        show_sweep(f, e);
+    else if (!strcmp(kind, "log"))
+        clear_line(f), fprintf(stderr, "%s\n", text_of(e, "text"));
+    else if (!strcmp(kind, "state"))
+        show_state(f, e);
+}
+
+static void take(void *ctx, const json_t *e)
+{
+    struct follow *f = ctx;
+    const char *kind = text_of(e, "event");
+    if (f->json)
+        out_json_line(e);
+    else
+        show(f, kind, e);
+    if (!strcmp(kind, "fit"))
+        take_fit(f, e);
+    if (strcmp(kind, "state"))
+        return;
+    snprintf(f->state, sizeof f->state, "%s", text_of(e, "state"));
+    f->ended = ask_is_end(f->state);
+}
+
+// --- where the stream does not tell --------------------------------------------------------------
+
+static bool unknown(struct follow *f, const struct gon_error *err)
+{
+    f->unknown = err->code == GON_E_INPUT;
+    f->ended = f->ended || f->unknown;
+    return f->unknown;
+}
+
+// Whether there is more to follow. An answer that fails says nothing of the run.
+static bool goes_on(struct follow *f)
+{
+    struct gon_error err = {0};
+    if (ask_end(f->ask, &err) < 0)
+        unknown(f, &err);
+    return !f->ended;
 }
 
 static bool take_event(void *ctx, const json_t *e)
 {
     struct follow *f = ctx;
-    const char *kind = text_of(e, "event");
-    if (strcmp(kind, "lost") && whole(e, "run") != f->run)
-        return true;
-    if (f->json)
-        out_json_line(e);
-    if (!strcmp(kind, "fit"))
-        take_fit(f, e);
-    else if (!f->json && !strcmp(kind, "reading") && f->live)
-        show_reading(f, e);
-    else if (!f->json && !strcmp(kind, "sweep"))
-        show_sweep(f, e);
-    else if (!f->json && !strcmp(kind, "log"))
-        clear_line(f), fprintf(stderr, "%s\n", text_of(e, "text"));
-    if (strcmp(kind, "state"))
-        return true;
-    if (!f->json)
-        show_state(f, e);
-    snprintf(f->state, sizeof f->state, "%s", text_of(e, "state"));
-    f->ended = is_end(f->state);
-    return !f->ended;
+    const bool lost = !strcmp(text_of(e, "event"), "lost");
+    if (lost || whole(e, "run") == f->run)
+        take(f, e);
+    return lost ? goes_on(f) : !f->ended;
 }
 
-static void trouble(void *ctx, const char *text)
+static void went_away(void *ctx)
 {
-    clear_line(ctx);
-    out_say("%s", text);
+    struct follow *f = ctx;
+    clear_line(f);
+    out_say("the connection to the daemon broke; trying again for 10 s");
+    f->away = true;
 }
 
-static int report_end(struct follow *f)
+static bool came_back(void *ctx)
+{
+    struct follow *f = ctx;
+    out_say("the daemon is back");
+    f->away = false;
+    return goes_on(f);
+}
+
+// --- the end -------------------------------------------------------------------------------------
+
+// The last fit of a run that ended in an earlier life of the daemon.
+static json_t *stored_fit(const char *file)
+{
+    struct store *store = NULL;
+    if (store_open(file, STORE_READ, &store, NULL) < 0)
+        return NULL;
+    char *text = store_read_fit(store, -1);
+    json_t *fit = text ? json_loads(text, 0, NULL) : NULL;
+    free(text);
+    store_close(store, NULL);
+    return fit;
+}
+
+static int report_end(struct follow *f, const char *file)
 {
     bool done = !strcmp(f->state, "done");
+    if (f->unknown) {
+        out_say("the daemon does not know run %d any more; see: gonio list", f->run);
+        return EXIT_FAILED;
+    }
+    if (done && !f->fit && *file)
+        f->fit = stored_fit(file);
     if (!f->json && f->fit)
         fitview_print(f->fit);
-    if (!f->json && *f->file)
-        fprintf(stderr, "readings: %s   (gonio show %d, gonio fit %d)\n", f->file, f->run, f->run);
+    if (!f->json && *file)
+        fprintf(stderr, "readings: %s   (gonio show %d, gonio fit %d)\n", file, f->run, f->run);
     if (!f->json && !done)
         fprintf(stderr, "go on with: gonio resume %d\n", f->run);
     return done && f->fit ? EXIT_OK : EXIT_FAILED;
 }
 
+static int report_interrupt(const struct follow *f)
+{
+    if (f->away)
+        out_say("stopped watching while the daemon was away; see: gonio list");
+    else
+        out_say("stopped watching; run %d goes on. Stop it: gonio stop. Watch it: gonio watch",
+                f->run);
+    return EXIT_INTERRUPTED;
+}
+
 int follow_run(const char *socket, const struct interrupt *i, const struct follow_run *what)
 {
-    struct follow f = {.run = what->run,
-                       .file = what->file,
-                       .json = what->json,
-                       .live = !what->json && out_colour(stderr)};
-    struct client_follower follower = {&f, take_event, trouble};
+    struct follow f = {
+        .run = what->run, .json = what->json, .live = !what->json && out_colour(stderr)};
+    struct client_follower follower = {&f, take_event, went_away, came_back};
     struct client *c = NULL;
     struct gon_error err = {0};
     int rc = client_new(socket, &c, &err), status;
+    rc = rc < 0 ? rc : ask_new(socket, i->fd, what->run, take, &f, &f.ask, &err);
     if (rc == 0 && f.live)
         fprintf(stderr, "(Ctrl-C: stop watching, the run continues.  Stop the run: gonio stop)\n");
     rc = rc < 0 ? rc : client_follow(c, what->last_id, i->fd, &follower, &err);
     clear_line(&f);
-    if (rc == GON_E_CANCELED) {
-        out_say("stopped watching; run %d goes on. Stop it: gonio stop. Watch it: gonio watch",
-                f.run);
-        status = EXIT_INTERRUPTED;
-    } else {
-        status = rc < 0 ? out_fail(&err) : report_end(&f);
-    }
+    if (rc == GON_E_CANCELED)
+        status = report_interrupt(&f);
+    else
+        status = rc < 0 ? out_fail(&err) : report_end(&f, what->file);
     json_decref(f.fit);
+    ask_free(f.ask);
     client_free(c);
     return status;
 }

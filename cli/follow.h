@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Following a run to its end: a live line on a terminal, a line a sweep otherwise, or with json
 // each of the daemon's events as one line on stdout. Ctrl-C ends the following, never the run.
+//
+// Where the event stream cannot tell the end (events were lost, the daemon was away and is another
+// one now), the run is asked for instead.
 #pragma once
 #include "base/err.h"
 

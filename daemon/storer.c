@@ -83,7 +83,9 @@ static struct run *run_of(struct storer *s, const struct catalog_entry *e)
     snprintf(run->path, sizeof run->path, "%s", e->path);
     snprintf(run->name, sizeof run->name, "%s", e->name);
     snprintf(run->sample, sizeof run->sample, "%s", e->sample);
-    if (run->state != RUN_DONE)
+    if (!strcmp(e->state, "interrupted")) // why it was paused does not matter any more
+        snprintf(run->text, sizeof run->text, "interrupted, the daemon died");
+    else if (run->state != RUN_DONE)
         snprintf(run->text, sizeof run->text, "%s", e->problem);
     return run;
 }
