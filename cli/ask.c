@@ -95,14 +95,24 @@ static void tell_changes(struct ask *a, json_t *now)
     a->last = json_incref(now);
 }
 
-int ask_end(struct ask *a, struct gon_error *err)
+static int answer(struct ask *a, bool only_end, struct gon_error *err)
 {
     char path[60];
     json_t *now = NULL;
     snprintf(path, sizeof path, "/api/v1/runs/%d", a->run);
     int rc = client_request(a->client, "GET", path, NULL, &now, err);
-    if (rc == 0 && ask_is_end(state_of(now)))
+    if (rc == 0 && (!only_end || ask_is_end(state_of(now))))
         tell_changes(a, now);
     json_decref(now);
     return rc;
+}
+
+int ask_changes(struct ask *a, struct gon_error *err)
+{
+    return answer(a, false, err);
+}
+
+int ask_end(struct ask *a, struct gon_error *err)
+{
+    return answer(a, true, err);
 }

@@ -16,9 +16,10 @@ int ask_new(const char *socket, int interrupt_fd, int run,
             struct gon_error *err);
 void ask_free(struct ask *a); // NULL is fine
 
-// When the run has ended, tells all of its last reading, sweep, fit and state that was not told yet;
-// nothing while it goes on, because the stream tells that. GON_E_INPUT: the daemon does not know
-// that run (any more); others as client_request.
+// Tells what is new: a reading, a sweep, a fit, then a state or its reason; the first time, all of
+// it. GON_E_INPUT: the daemon does not know that run (any more); others as client_request.
+int ask_changes(struct ask *a, struct gon_error *err);
+// The same when the run has ended, and nothing while it goes on: a stream tells that.
 int ask_end(struct ask *a, struct gon_error *err);
 
 bool ask_is_end(const char *state); // done, stopped or failed

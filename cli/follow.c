@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "cli/follow.h"
 
+#include "base/clk.h"
 #include "campaign/store.h"
 #include "cli/ask.h"
 #include "cli/client.h"
@@ -14,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BAR = 20 };
+enum { BAR = 20, ASK_MS = 1000 };
 
 struct follow {
     int run;
@@ -213,6 +214,26 @@ static bool came_back(void *ctx)
     return goes_on(f);
 }
 
+static int ask_on(struct follow *f, const struct interrupt *i, struct gon_error *err)
+{
+    int64_t answered_ns = clk_now_ns(clk_system());
+    out_say("no event stream is free (%s); asking for the run once a second", err->text);
+    while (!f->ended) {
+        int rc = ask_changes(f->ask, err);
+        const int64_t now_ns = clk_now_ns(clk_system());
+        if (rc == 0)
+            answered_ns = now_ns;
+        else if (rc == GON_E_CANCELED)
+            return rc;
+        else if (!unknown(f, err) && now_ns - answered_ns > CLIENT_AWAY_NS)
+            return rc;
+        f->away = rc < 0;
+        if (!f->ended && interrupt_came(i, ASK_MS))
+            return GON_E_CANCELED;
+    }
+    return GON_OK;
+}
+
 // --- the end -------------------------------------------------------------------------------------
 
 // The last fit of a run that ended in an earlier life of the daemon.
@@ -268,6 +289,8 @@ int follow_run(const char *socket, const struct interrupt *i, const struct follo
     if (rc == 0 && f.live)
         fprintf(stderr, "(Ctrl-C: stop watching, the run continues.  Stop the run: gonio stop)\n");
     rc = rc < 0 ? rc : client_follow(c, what->last_id, i->fd, &follower, &err);
+    if (rc == GON_E_REFUSED)
+        rc = ask_on(&f, i, &err);
     clear_line(&f);
     if (rc == GON_E_CANCELED)
         status = report_interrupt(&f);

@@ -3,7 +3,7 @@
 // each of the daemon's events as one line on stdout. Ctrl-C ends the following, never the run.
 //
 // Where the event stream cannot tell the end (events were lost, the daemon was away and is another
-// one now), the run is asked for instead.
+// one now, no stream is free), the run is asked for instead.
 #pragma once
 #include "base/err.h"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""gonio run and watch when following is not as easy as usual: the daemon dies, events are lost,
+"""gonio run and watch when following is not as easy as usual: the daemon dies, events are lost, no stream is free,
 Ctrl-C comes early. What cannot be had from goniod on demand is played by a stand-in for its HTTP."""
 import http.server
 import json
@@ -106,6 +106,22 @@ def test_a_run_that_the_daemon_does_not_know_any_more_is_no_success(stand_in):
     assert r.returncode == 1 and "does not know run 1 any more" in r.stderr, r
 
 
+def test_without_a_stream_the_run_is_asked_for(stand_in):
+    full = '{"error":"too many event streams (8)","what_to_do":"stop one of the others that watch"}'
+    env = stand_in(("/api/v1/status", 200, status_reply()), ("/api/v1/events", 503, full),
+                   ("/api/v1/runs/1", 200, run_reply("running")), ("/api/v1/runs/1", 200, run_reply("running", done=4)),
+                   ("/api/v1/runs/1", 503, full),
+                   ("/api/v1/runs/1", 200, run_reply("paused", "laser: gone", done=5, fit=FIT)),
+                   ("/api/v1/runs/1", 200, run_reply("done", done=9, fit=FIT)))
+    r = gonio("watch", "--json", env=env, patience_s=PATIENCE_S)
+    assert r.returncode == 0, r
+    events = [json.loads(line) for line in r.stdout.splitlines()]
+    assert [e["done"] for e in events if e["event"] == "reading"] == [3, 4, 5, 9]
+    assert [e["state"] for e in events if e["event"] == "state"] == ["running", "paused", "done"]
+    assert sum(e["event"] == "fit" for e in events) == 1
+    assert r.stderr.count("once a second") == 1
+
+
 def test_a_killed_daemon_that_is_back_tells_what_became_of_the_run(start_sim, start_daemon, tmp_path):
     sim = start_sim("--fast", "--seed", "5", "--set", "laser.warmup_s=0.05", "--set", "laser.temperatures_s=0")
     d = start_daemon("--config", sim.folder / "goniod-tcp.cfg")
@@ -122,6 +138,29 @@ def test_a_killed_daemon_that_is_back_tells_what_became_of_the_run(start_sim, st
     assert "go on with: gonio resume 1" in run.errors() and "theta_i nan" not in run.errors()
     assert json.loads(watch.wait_line('{"event":"state"'))["state"] == "stopped"
     assert watch.process.wait(PATIENCE_S) == 1
+
+
+def test_run_follows_when_all_streams_are_taken(daemon, stand_in, tmp_path):
+    config = tmp_path / "small.cfg"
+    config.write_text(SMALL)
+    streams = [daemon.follow() for _ in range(8)]
+    try:
+        r = daemon.gonio("run", config)
+        assert r.returncode == 0 and "once a second" in r.stderr, r
+        assert "sigma" in r.stdout and ".gonio" in r.stderr
+    finally:
+        for s in streams:
+            s.close()
+    # A daemon that was started since then does not know the fit; the file does.
+    (file,) = [e["file"] for e in daemon.request("GET", "/api/v1/runs")[1]["runs"] if e["state"] == "done"]
+    env = stand_in(("/api/v1/status", 200, status_reply()), ("/api/v1/events", 200, LOST),
+                   ("/api/v1/runs/1", 200, run_reply("done")))
+    assert gonio("watch", env=env, patience_s=PATIENCE_S).returncode == 1
+    env["GONIO_SOCKET"] = stand_in(
+        ("/api/v1/status", 200, status_reply().replace("/nowhere/0001-x.gonio", file)),
+        ("/api/v1/events", 200, LOST), ("/api/v1/runs/1", 200, run_reply("done")))["GONIO_SOCKET"]
+    again = gonio("watch", env=env, patience_s=PATIENCE_S)
+    assert again.returncode == 0 and again.stdout == r.stdout, again
 
 
 def has_socket(pid):
