@@ -149,7 +149,7 @@ static void settle_state(struct catalog_entry *e)
 {
     static const char *const living[] = {"preparing", "running", "paused", "stopping", NULL};
     if (!*e->state)
-        snprintf(e->state, sizeof e->state, "queued");
+        snprintf(e->state, sizeof e->state, "new");
     for (int i = 0; living[i] && !e->writer_pid; i++)
         if (!strcmp(e->state, living[i]))
             snprintf(e->state, sizeof e->state, "interrupted");

@@ -12,7 +12,7 @@ struct catalog_entry {
     int id; // 0: a file outside the catalogue
     char path[CATALOG_PATH];
     char name[CAMPAIGN_NAME], sample[CAMPAIGN_NAME];
-    char state[16]; // "queued" before it ever ran, "running", "paused", "stopped", "done",
+    char state[16]; // "new" before it ever ran, "running", "paused", "stopped", "done",
                     // "failed", or "interrupted": it says running or paused, but no process holds
                     // the file; "unreadable": problem says why
     char problem[240]; // why it is paused, stopped, failed or unreadable

@@ -102,12 +102,21 @@ static void print_detector(const json_t *d)
     }
 }
 
+static void print_lost(const json_t *d)
+{
+    printf("%sLOST%s: %s", out_begin(stdout, OUT_RED), out_end(stdout), text_of(d, "problem"));
+    if (json_is_true(json_object_get(d, "emission")))
+        printf("; LASER MAY BE ON: use its key or the interlock");
+    else if (json_is_true(json_object_get(d, "off_unconfirmed")))
+        printf("; it did not confirm that it is off");
+}
+
 static void print_device(const json_t *d)
 {
     const char *name = text_of(d, "name"), *link = text_of(d, "link");
     printf("%-9s ", name);
     if (!strcmp(link, "lost"))
-        printf("%sLOST%s: %s", out_begin(stdout, OUT_RED), out_end(stdout), text_of(d, "problem"));
+        print_lost(d);
     else if (!strcmp(name, "laser"))
         print_laser(d);
     else if (!strcmp(name, "detector"))
@@ -195,15 +204,22 @@ static int run_stop(const struct verb *verb, int argc, char **argv)
     json_t *reply = NULL;
     int status = command(verb, argc, argv, "/api/v1/stop", &reply), run = whole(reply, "run");
     bool off = json_is_true(json_object_get(reply, "laser_off"));
+    const json_t *other;
+    size_t i;
     if (reply && run)
         fprintf(stderr, "run %d %s%s. Go on with: gonio resume %d\n", run, text_of(reply, "state"),
                 off ? ": laser off, axes halted" : "", run);
     else if (reply)
         fprintf(stderr, "nothing was running%s\n",
                 off ? "; laser off and axes halted all the same" : "");
+    json_array_foreach(json_object_get(reply, "put_back"), i, other)
+        fprintf(stderr, "run %d was waiting and waits no more. Start it with: gonio resume %d\n",
+                (int)json_integer_value(other), (int)json_integer_value(other));
     if (reply && !off) {
-        out_say("the laser does not confirm that it is off: use its key or the interlock; see: "
-                "gonio status");
+        out_say("%s: use its key or the interlock; see: gonio status",
+                strstr(text_of(reply, "text"), "LASER MAY BE ON")
+                    ? "LASER MAY BE ON"
+                    : "the laser does not confirm that it is off");
         status = EXIT_FAILED;
     }
     json_decref(reply);

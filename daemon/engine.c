@@ -64,6 +64,7 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
         .u_per_sr = (double)NAN,
         .left_s = seconds_left(e),
         .light = instrument_light_left(e->in),
+        .wanted = e->wanted,
         .text = text,
     };
 }

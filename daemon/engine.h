@@ -54,6 +54,7 @@ struct engine_event {
     unsigned flags;  // of the stored reading
     double left_s;   // estimate; NAN unknown
     enum safety_light light;
+    bool wanted;      // ENGINE_STATE, RUN_PAUSED: by the operator; nothing is wrong
     const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
 

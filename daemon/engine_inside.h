@@ -20,6 +20,7 @@ struct engine {
     bool ready;  // connected, homed
     bool lit;    // laser on, warmed up, monitor steady
     bool dark;   // laser off, read back at this campaign's own request
+    bool wanted; // the pause is the operator's
     int returns; // pauses that ended by themselves since the last accepted reading
     int64_t light_ns, laser_look_ns;
     struct acquire acquire;

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+static const char by_operator[] = "by the operator; go on with: gonio resume";
+
 #define RETURNS_MOST 5 // pauses that ended by themselves, without a reading between them
 
 int engine_canceled(struct engine *e)
@@ -48,7 +50,8 @@ bool engine_pause_asked(struct engine *e)
 
 int engine_operator_paused(struct engine *e)
 {
-    return gon_fail(&e->why, GON_E_REFUSED, "paused by the operator; go on with: gonio resume");
+    e->wanted = true;
+    return gon_fail(&e->why, GON_E_REFUSED, "%s", by_operator);
 }
 
 static int next_lost(const struct instrument_snapshot *s, int part)
@@ -120,7 +123,8 @@ static int wait_for_devices(struct engine *e)
 {
     do {
         if (engine_pause_asked(e)) {
-            engine_enter_pause(e, "paused by the operator; go on with: gonio resume");
+            e->wanted = true;
+            engine_enter_pause(e, by_operator);
             return wait_for_operator(e);
         }
         (void)resume_asked(e); // it goes on by itself anyway
@@ -152,6 +156,7 @@ int engine_pause_run(struct engine *e)
         rc = wait_for_operator(e);
         e->returns = 0;
     }
+    e->wanted = false;
     if (rc >= 0)
         engine_enter(e, before, by_itself ? "everything is there again; going on" : "resumed");
     return rc;

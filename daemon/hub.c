@@ -32,6 +32,7 @@ struct hub {
     struct fitter *fitter;
     struct instrument_snapshot *snapshot; // NULL: none yet
     char last_error[480];
+    json_t *put_back; // runs that waited when a stop came, for its answer; NULL: none
     int64_t start_ns;
     uint64_t stops[MOST_STOPS]; // tickets that wait for the end of a stop
     int stop_count;
@@ -60,6 +61,8 @@ static void answer_stops(struct hub *h, int status, const char *body)
 
 static void answer_stopped(struct hub *h, int status, json_t *o)
 {
+    json_object_set_new(o, "put_back", h->put_back ? h->put_back : json_array());
+    h->put_back = NULL;
     json_object_set_new(o, "laser_off", json_boolean(h->snapshot && instrument_is_dark(h->snapshot)));
     char *body = view_text(o);
     answer_stops(h, status, body);
@@ -81,11 +84,15 @@ static void keep_state(struct hub *h, const struct run *run)
 static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
-    bool bad = run->state == RUN_FAILED || run->state == RUN_PAUSED;
+    const bool paused = run->state == RUN_PAUSED;
+    const bool bad = run->state == RUN_FAILED ||
+                     (paused && (!run->wanted || run->light != SAFETY_LIGHT_OFF));
     log_say(h->options.log, bad ? LOG_WARN : LOG_NOTICE, "run", "%d %s%s%s", run->id,
             run_state_name(run->state), *run->text ? ": " : "", run->text);
     if (bad)
         snprintf(h->last_error, sizeof h->last_error, "%s", run->text);
+    else if (run->state == RUN_RUNNING || run->state == RUN_DONE)
+        h->last_error[0] = 0; // it was overcome; the log and the file's events keep it
     publish(h, "state", view_run(run, false));
     if (run == queue_active(h->queue))
         keep_state(h, run);
@@ -273,11 +280,21 @@ void hub_find(struct hub *h, int run, uint64_t ticket)
     note_post(h->store_box, n);
 }
 
+static void note_waiting(struct hub *h)
+{
+    const struct run *run, *active = queue_active(h->queue);
+    h->put_back = h->put_back ? h->put_back : json_array();
+    for (size_t i = 0; (run = queue_at(h->queue, i)); i++)
+        if (run != active && run->state == RUN_QUEUED)
+            json_array_append_new(h->put_back, json_integer(run->id));
+}
+
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
 {
     const bool room = h->stop_count < MOST_STOPS;
     if (room)
         h->stops[h->stop_count++] = ticket;
+    note_waiting(h);
     if (!queue_stop(h->queue, why))
         note_post(h->run_box, note_new(NOTE_HALT));
     return room;
@@ -521,6 +538,7 @@ bool hub_free(struct hub *h)
         mail_free(boxes[i], note_drop);
     cancel_free(h->cancel);
     free(h->snapshot);
+    json_decref(h->put_back);
     free(h);
     return may_be_on;
 }

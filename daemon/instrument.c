@@ -310,7 +310,7 @@ bool instrument_free(struct instrument *in)
     if (!in)
         return true;
     in->watcher = NULL;
-    const bool dark = safety_free(in->safety);
+    const bool dark = in->safety && safety_free(in->safety);
     in->safety = NULL;
     for (int i = 0; i < INSTRUMENT_AXES; i++)
         if (in->motor[i].axis) {

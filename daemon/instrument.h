@@ -81,7 +81,8 @@ int instrument_open(const struct bench_config *bench, struct clk *clk,
                     struct instrument **ret_instrument, struct gon_error *err);
 int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts,
                    struct clk *clk, struct instrument **ret_instrument, struct gon_error *err);
-// Laser off and axes stopped first. False when a laser that was reached before did not confirm OFF.
+// Laser off and axes stopped first. False when OFF was not read back, also when the laser was never
+// reached: what it does then nobody knows.
 bool instrument_free(struct instrument *in);
 
 const struct bench_config *instrument_bench(const struct instrument *in);

@@ -177,8 +177,11 @@ int instrument_emission_off(struct instrument *in, struct gon_error *err)
     if (rc < 0)
         return rc;
     rc = instrument_note(in, PART_LASER, safety_off(in->safety, err), err);
-    if (rc >= 0)
+    if (rc >= 0) { // power and faults are as of the next question
         in->laser.emission = false;
+        in->laser.state = LASER_OFF;
+        in->laser.power_w = (double)NAN;
+    }
     return rc;
 }
 

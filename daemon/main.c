@@ -131,7 +131,7 @@ static void looked(void *ctx, const struct instrument_snapshot *s)
 static void signaled(void *ctx, int signal)
 {
     struct daemon *d = ctx;
-    log_say(d->log, LOG_NOTICE, "goniod", "signal %d: laser off, axes stopped, then the end",
+    log_say(d->log, LOG_NOTICE, "goniod", "signal %d: ending; the laser first, then the axes",
             signal);
     if (!d->deadline)
         d->deadline = deadline_set(END_S, last_words(d->dark), 1);
@@ -170,7 +170,7 @@ static void ready(void *ctx, const struct instrument_snapshot *s)
     (void)ctx;
     for (int i = 0; i < PART_COUNT; i++)
         if (s->part[i].link == PART_LOST)
-            printf("waiting for %s: %s\n", s->part[i].name, s->part[i].problem);
+            printf("waiting for %s\n", s->part[i].problem);
     bool lost = s->part[PART_LASER].link != PART_OK;
     printf("ready: axes %s, laser %s.   Ctrl-C stops (laser off first).\n", axes_text(s),
            lost                    ? "not reachable"

@@ -225,6 +225,7 @@ void queue_engine_event(struct queue *q, int id, const struct engine_event *even
     if (!run || run != q->active)
         return;
     run->light = event->light;
+    run->wanted = event->wanted;
     run->left_s = event->left_s;
     run->sweeps = event->sweeps;
     run->sweep = event->sweep;

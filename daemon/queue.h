@@ -29,6 +29,7 @@ struct run {
     unsigned flags;
     double left_s;       // NAN unknown
     enum safety_light light;
+    bool wanted; // the pause is the operator's: nothing is wrong
     int fits_open;       // asked for and not yet stored
     bool fit_failed;     // the last one
     char *fit;           // JSON of the last one stored; NULL: none in this life of the daemon

@@ -155,6 +155,8 @@ static void publish_port(void *ctx, const struct engine_event *event)
 {
     struct runner *r = ctx;
     struct note *n = note_new(NOTE_HAPPENED);
+    if (event->kind == ENGINE_STATE) // what is said of the devices is as new as the state
+        send_snapshot(r);
     n->run = r->run;
     n->event = *event;
     n->text = note_text(event->text);

@@ -165,7 +165,9 @@ def test_pause_holds_and_resume_goes_on(daemon):
     status = json.loads(daemon.gonio("status", "--json").stdout)
     assert status["run"]["run"] == run and status["run"]["state"] == "paused"
     assert status["run"]["emission"] is False
-    assert "paused" in daemon.gonio("status").stdout
+    shown = daemon.gonio("status").stdout
+    assert "paused" in shown and "by the operator" in shown and "last error" not in shown, shown
+    assert "emitting" not in shown and "warming" not in shown, shown  # what was read before OFF
     assert daemon.gonio("pause").returncode == 4
     r = daemon.gonio("resume", "--detach")
     assert r.returncode == 0, r.stderr
@@ -180,9 +182,11 @@ def test_a_second_campaign_waits_and_a_stop_puts_it_back(daemon):
     assert daemon.status()["queued"] == [second["run"]]
     stream = daemon.follow(first["event_id"])
     stream.until_state(first["run"], "preparing")
-    assert daemon.request("POST", "/api/v1/stop")[0] == 200
+    stop = daemon.gonio("stop")
+    assert stop.returncode == 0 and f"run {second['run']} was waiting and waits no more" in stop.stderr, stop.stderr
     stream.until_state(first["run"], "stopped")
     stream.close()
+    assert [e["state"] for e in json.loads(daemon.gonio("list", "--json").stdout)[-2:]] == ["stopped", "new"]
     runs = {r["run"]: r["state"] for r in daemon.request("GET", "/api/v1/runs")[1]["runs"]}
     assert runs[first["run"]] == "stopped" and runs[second["run"]] == "stopped"
     assert daemon.status()["run"] is None

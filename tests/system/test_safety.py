@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from conftest import BUILD
+from conftest import BUILD, ROOT, Daemon
 
 PLAN = """\
 campaign: {
@@ -55,6 +55,8 @@ def test_a_stop_never_says_off_of_a_laser_that_is_unplugged(measuring):
     events.until(lambda e: e["event"] == "state" and e["state"] == "paused")
     stopped = daemon.gonio("stop")
     assert stopped.returncode == 1 and "laser off" not in stopped.stderr, stopped.stderr
+    assert "LASER MAY BE ON: use its key or the interlock" in stopped.stderr
+    assert "LASER MAY BE ON" in daemon.gonio("status").stdout
     assert sim.control(do="state")["laser"]["emission"]
     assert daemon.end() == 1
     assert "LASER MAY BE ON" in daemon.errors()
@@ -70,6 +72,14 @@ def test_a_second_stop_says_it_too(measuring):
     assert again.returncode == 1 and "LASER MAY BE ON" in again.stderr, again.stderr
     sim.control(do="set", ignore_off=False)
     assert daemon.end() == 0
+
+
+def test_a_laser_that_was_never_there_is_not_called_off(tmp_path):
+    bench = (ROOT / "configs" / "goniod.cfg").read_text().replace("/dev/serial/by-id", str(tmp_path))
+    (tmp_path / "goniod.cfg").write_text(bench)
+    daemon = Daemon(tmp_path / "d", "--config", tmp_path / "goniod.cfg")
+    assert daemon.end() == 1
+    assert "LASER MAY BE ON" in daemon.errors() and "laser off" not in daemon.errors()
 
 
 def dark_within(sim, patience_s):

@@ -107,7 +107,7 @@ static void the_list_says_how_far_each_is(void **state)
     assert_string_equal(list[1].state, "failed");
     assert_string_equal(list[1].problem, "laser: on fire");
     assert_true(list[1].finished_utc_ms == 4000 && list[1].writer_pid == 0);
-    assert_string_equal(list[2].state, "queued");
+    assert_string_equal(list[2].state, "new");
     assert_string_equal(list[3].state, "unreadable");
     assert_non_null(strstr(list[3].problem, "not a campaign file"));
     free(list);
