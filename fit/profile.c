@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "fit/profile.h"
 
+#include "fit/hold.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -41,19 +43,13 @@ static double quantile_of(const struct fit_set *set, double dof)
     return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n);
 }
 
-// The others fitted with the parameter held at `value`; starts along the valley from `from`.
-static bool hold(const struct walk *w, double value, struct fit_optimum *at, double *ret_z)
+static bool hold(const struct walk *w, double value, const struct fit_optimum *from,
+                 struct fit_optimum *ret_at, double *ret_z)
 {
-    struct fit_space held = *w->space;
-    double x = inside(w->which, value), step = x - at->x[w->which];
-    double own = w->cov->inverse[w->which][w->which];
-    for (int i = 0; i < FIT_PARAMS; i++)
-        if (own > 0)
-            at->x[i] += step * w->cov->inverse[i][w->which] / own;
-    held.lower[w->which] = held.upper[w->which] = x;
-    if (!polish(w->set, &held, STEPS, w->control, at))
+    const struct hold h = {w->set, w->space, w->cov, w->control};
+    if (!hold_at(&h, w->which, inside(w->which, value), from, ret_at))
         return false;
-    *ret_z = sqrt(fmax(0, (at->q - w->best->q) * w->scale));
+    *ret_z = sqrt(fmax(0, (ret_at->q - w->best->q) * w->scale));
     return true;
 }
 
@@ -78,13 +74,13 @@ static bool find_end(struct walk *w, double direction, double u, double *ret_end
     double room = fabs(bound - centre), inner = 0, inner_z = 0, outer = (double)INFINITY,
            outer_z = (double)INFINITY;
     double distance = fmin(w->quantile * u, room);
-    struct fit_optimum at = *w->best;
+    struct fit_optimum at, inner_at = *w->best;
     *ret_end = bound;
     if (!(room > 0) || !isfinite(w->scale))
         return true;
     for (int trial = 0; trial < TRIALS; trial++) {
         double z;
-        if (!hold(w, distance < room ? centre + direction * distance : bound, &at, &z))
+        if (!hold(w, distance < room ? centre + direction * distance : bound, &inner_at, &at, &z))
             return false;
         if (at.q < ret_lowest->q)
             *ret_lowest = at;
@@ -99,6 +95,7 @@ static bool find_end(struct walk *w, double direction, double u, double *ret_end
                 return true;
             inner = distance;
             inner_z = z;
+            inner_at = at;
         } else {
             outer = distance;
             outer_z = z;

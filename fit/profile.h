@@ -7,7 +7,7 @@
 // In the long curved valley of n, k and ks that scale differs from parameter to parameter, and k
 // alone would stop short (80 % coverage was measured). So the intervals of these three also take in
 // what they are at the admitted points of the other profiles; where the valley is straight that
-// adds nothing.
+// adds nothing. Fits of the others start in every valley (fit/hold.h).
 #pragma once
 #include "fit/covariance.h"
 
