@@ -83,9 +83,10 @@ static int unknown(const struct option_row *rows, const char *name, size_t lengt
     for (int i = 0; i < MOST_ROWS && rows[i].name; i++)
         words[i] = rows[i].name;
     const char *meant = options_suggest(typed, words);
-    return meant
-               ? gon_fail(err, GON_E_INPUT, "unknown option '%s'; did you mean '%s'?", typed, meant)
-               : gon_fail(err, GON_E_INPUT, "unknown option '%s'; see --help", typed);
+    if (!meant)
+        return gon_fail(err, GON_E_INPUT, "unknown option '%s'; see --help", typed);
+    return gon_fail(err, GON_E_INPUT, "unknown option '%s' (did you mean '%s'?)", typed,
+                    meant); // in brackets: callers go on with "; see: ..."
 }
 
 static int take_number(const struct option_row *row, const char *text, void *target,

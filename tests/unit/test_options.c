@@ -71,7 +71,7 @@ static void mistakes_say_what_was_meant(void **state)
     (void)state;
     struct target t;
     assert_int_equal(take("--sed 3", &t), GON_E_INPUT);
-    assert_string_equal(err.text, "unknown option '--sed'; did you mean '--seed'?");
+    assert_string_equal(err.text, "unknown option '--sed' (did you mean '--seed'?)");
     assert_int_equal(take("--frobnicate=1", &t), GON_E_INPUT);
     assert_string_equal(err.text, "unknown option '--frobnicate'; see --help");
     assert_int_equal(take("--seed", &t), GON_E_INPUT);
