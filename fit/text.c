@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #define LEAST_GAIN 0.05 // of advice worth a sentence
 
@@ -35,17 +36,36 @@ const char *fit_param_name(enum fit_param p)
     return p < FIT_PARAMS ? name[p] : "?";
 }
 
+// With two digits of u and no exponent where that is short; four digits where nothing tells u.
+static int value_text(double value, double u, char *text, size_t size)
+{
+    const int decimals = u > 0 ? 1 - (int)floor(log10(fmin(u, 1e15))) : 100;
+    if (decimals > 12)
+        return snprintf(text, size, "%.4g", value);
+    return snprintf(text, size, "%.*f", decimals > 0 ? decimals : 0, value);
+}
+
+enum { LIST = 200 };
+
+// ", " between, what does not fit is left out.
+static void append(char list[LIST], const char *name, double value, double u)
+{
+    char text[40];
+    const size_t length = strlen(list);
+    value_text(value, u, text, sizeof text);
+    if (length + strlen(name) + strlen(text) + 6 < LIST)
+        snprintf(list + length, LIST - length, "%s%s = %s", length ? ", " : "", name, text);
+}
+
 // "n = 0.2, k = 10": of the parameters where `wanted` says so.
 static void list(const struct fit_result *r, bool (*wanted)(const struct fit_estimate *e),
-                 const enum fit_param *which, int count, char text[160])
+                 const enum fit_param *which, int count, char text[LIST])
 {
-    int length = 0;
     text[0] = 0;
-    for (int i = 0; i < count && length < 120; i++) {
+    for (int i = 0; i < count; i++) {
         const struct fit_estimate *e = &r->estimate[which[i]];
         if (wanted(e))
-            length += snprintf(text + length, 160 - (size_t)length, "%s%s = %.4g",
-                               length ? ", " : "", fit_param_name(which[i]), e->value);
+            append(text, fit_param_name(which[i]), e->value, e->at_bound ? 0 : e->u);
     }
 }
 
@@ -54,9 +74,15 @@ static bool at_bound(const struct fit_estimate *e)
     return e->at_bound;
 }
 
+// By the data: what options hold needs no telling.
 static bool unidentified(const struct fit_estimate *e)
 {
-    return !e->identified;
+    return !e->identified && !(e->at_bound && e->u == 0);
+}
+
+static bool identified(const struct fit_estimate *e)
+{
+    return e->identified;
 }
 
 static int measurement_text(const struct fit_advice *a, char *text, size_t size)
@@ -120,6 +146,23 @@ int fit_advice_text(const struct fit_result *r, int which, char *text, size_t si
                     fit_param_name((enum fit_param)most), e->u, a->u[most]);
 }
 
+// What the readings do not tell, what can be used instead, and what would help.
+static int not_identified_text(const struct fit_result *r, char *text, size_t size)
+{
+    static const enum fit_param optical[] = {FIT_N, FIT_K, FIT_KS}, others[] = {FIT_SIGMA, FIT_KD};
+    char names[LIST], more[LIST], use[LIST], advice[200] = "";
+    list(r, unidentified, optical, 3, names);
+    list(r, unidentified, others, 2, more);
+    list(r, identified, others, 2, use);
+    if (1.96 * r->ks_r45.u <= 0.25 * r->ks_r45.value) // as for a parameter
+        append(use, "ks R(45 deg)", r->ks_r45.value, r->ks_r45.u);
+    if (r->advice_count > 0 && r->advice[0].gain > LEAST_GAIN)
+        fit_advice_text(r, 0, advice, sizeof advice);
+    return snprintf(text, size, "These readings do not separate n, k and ks (%s)%s%s: use %s%s%s.",
+                    names, *more ? ", nor do they identify " : "", more,
+                    *use ? use : "none of them", *advice ? ". What helps most: " : "", advice);
+}
+
 static int model_error_text(const struct fit_result *r, char *text, size_t size)
 {
     static const char advice[] = "the intervals hold noise only, not what the model cannot follow";
@@ -140,8 +183,7 @@ static int model_error_text(const struct fit_result *r, char *text, size_t size)
 int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text, size_t size)
 {
     static const enum fit_param all[] = {FIT_N, FIT_K, FIT_SIGMA, FIT_KS, FIT_KD};
-    static const enum fit_param optical[] = {FIT_N, FIT_K, FIT_KS};
-    char names[160], advice[200] = "";
+    char names[LIST];
     switch (w) {
     case FIT_WARN_DHR_ABOVE_ONE:
         return snprintf(
@@ -165,16 +207,7 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
             text, size,
             "Fewer than 3 angles of incidence: reflectance and diffuse part cannot be told "
             "apart reliably; measure more sweeps.");
-    case FIT_WARN_NOT_IDENTIFIED:
-        list(r, unidentified, optical, 3, names);
-        if (r->advice_count > 0 && r->advice[0].gain > LEAST_GAIN)
-            fit_advice_text(r, 0, advice, sizeof advice);
-        return snprintf(
-            text, size,
-            "These readings do not separate n, k and ks (%s): use sigma = %.4g, kd = %.4g "
-            "and ks R(45 deg) = %.4g%s%s.",
-            names, r->params.sigma, r->params.kd, r->ks_r45.value,
-            *advice ? ". What helps most: " : "", advice);
+    case FIT_WARN_NOT_IDENTIFIED: return not_identified_text(r, text, size);
     case FIT_WARN_SCALE:
         return snprintf(
             text, size,

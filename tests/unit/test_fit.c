@@ -161,6 +161,36 @@ static void unidentified_and_unphysical_fits_are_said_to_be(void **state)
     readings_free(&r);
 }
 
+// A result of which only sigma, kd and ks R(45) matter here.
+static struct fit_result told(bool sigma, bool kd, double u_ks_r45)
+{
+    struct fit_result r = {.ks_r45 = {0.04528, u_ks_r45}, .warnings = FIT_WARN_NOT_IDENTIFIED};
+    r.estimate[FIT_N] = (struct fit_estimate){.value = 1.3, .u = 0.9};
+    r.estimate[FIT_K] = (struct fit_estimate){.value = 2, .at_bound = true}; // held
+    r.estimate[FIT_SIGMA] = (struct fit_estimate){.value = 0.15004, .u = 3e-4, .identified = sigma};
+    r.estimate[FIT_KS] = (struct fit_estimate){.value = 0.9, .u = 0.02, .identified = true};
+    r.estimate[FIT_KD] = (struct fit_estimate){.value = 0.00737, .u = 0.0051, .identified = kd};
+    return r;
+}
+
+static void only_what_is_identified_is_to_be_used(void **state)
+{
+    (void)state;
+    char text[600];
+    struct fit_result r = told(true, true, 1.2e-4);
+    fit_warning_text(&r, FIT_WARN_NOT_IDENTIFIED, text, sizeof text);
+    assert_string_equal(text, "These readings do not separate n, k and ks (n = 1.30): use sigma = "
+                              "0.15004, kd = 0.0074, ks R(45 deg) = 0.04528.");
+    r = told(true, false, 0.02);
+    fit_warning_text(&r, FIT_WARN_NOT_IDENTIFIED, text, sizeof text);
+    assert_string_equal(text, "These readings do not separate n, k and ks (n = 1.30), nor do they "
+                              "identify kd = 0.0074: use sigma = 0.15004.");
+    r = told(false, false, (double)NAN);
+    fit_warning_text(&r, FIT_WARN_NOT_IDENTIFIED, text, sizeof text);
+    assert_string_equal(text, "These readings do not separate n, k and ks (n = 1.30), nor do they "
+                              "identify sigma = 0.15004, kd = 0.0074: use none of them.");
+}
+
 static void neighbours_are_found_along_the_signed_angle(void **state)
 {
     (void)state;
@@ -403,6 +433,7 @@ int main(void)
         cmocka_unit_test(golden_data_recover_what_f00_identifies),
         cmocka_unit_test(measured_paints_reach_the_best_known_delta),
         cmocka_unit_test(unidentified_and_unphysical_fits_are_said_to_be),
+        cmocka_unit_test(only_what_is_identified_is_to_be_used),
         cmocka_unit_test(neighbours_are_found_along_the_signed_angle),
         cmocka_unit_test(one_sweep_and_few_points_are_fitted_with_a_warning),
         cmocka_unit_test(bad_readings_have_their_stop_codes),
