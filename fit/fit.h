@@ -103,6 +103,7 @@ struct fit_estimate {
                        // applies; within the bounds
     bool identified;   // not on a bound, and [lo95, hi95] within +-25 % of the value
     bool at_bound;     // within 1e-6 of the bounds' distance
+    bool at_lower;     // and that is the lower bound; equal bounds, which hold it: false
 };
 
 struct fit_derived {

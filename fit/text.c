@@ -69,15 +69,14 @@ static void list(const struct fit_result *r, bool (*wanted)(const struct fit_est
     }
 }
 
-static bool at_bound(const struct fit_estimate *e)
+static bool held(const struct fit_estimate *e) // by options, not by the data
 {
-    return e->at_bound;
+    return e->at_bound && e->u == 0;
 }
 
-// By the data: what options hold needs no telling.
 static bool unidentified(const struct fit_estimate *e)
 {
-    return !e->identified && !(e->at_bound && e->u == 0);
+    return !e->identified && !held(e);
 }
 
 static bool identified(const struct fit_estimate *e)
@@ -146,6 +145,57 @@ int fit_advice_text(const struct fit_result *r, int which, char *text, size_t si
                     fit_param_name((enum fit_param)most), e->u, a->u[most]);
 }
 
+// What a lower bound is to physics: 0 is the least of k, ks and kd, and below n = 1 there is
+// nothing to find for a paint, so that wider bounds help neither.
+static bool at_natural_bound(const struct fit_result *r, int p)
+{
+    const struct fit_estimate *e = &r->estimate[p];
+    const bool n = p == FIT_N && e->value < 1 + 1e-5, zero = p != FIT_SIGMA && e->value < 1e-5;
+    return e->at_lower && (n || zero);
+}
+
+static int natural_bound_text(const struct fit_result *r, int p, char *text, size_t size)
+{
+    static const char *const part[FIT_PARAMS] = {
+        [FIT_K] = "absorption", [FIT_KS] = "specular part", [FIT_KD] = "diffuse part"};
+    const struct fit_estimate *e = &r->estimate[p];
+    const char *name = fit_param_name((enum fit_param)p);
+    char most[100] = "", number[40];
+    if (p == FIT_N)
+        return snprintf(text, size,
+                        "n = %.4g, its lower bound: the readings want n %s. Wider bounds do not "
+                        "help: the model does not describe this sample.",
+                        e->value, e->value < 1 - 1e-5 ? "lower still" : "below 1");
+    value_text(e->hi95, e->hi95, number, sizeof number);
+    if (e->hi95 > e->value)
+        snprintf(most, sizeof most, " (%s up to %s is within the 95 %% interval)", name, number);
+    return snprintf(text, size, "%s = 0, the least it can be: the readings show no %s%s.", name,
+                    part[p], most);
+}
+
+// One sentence for the bounds that are somebody's choice, and one for each of nature's.
+static int at_bound_text(const struct fit_result *r, char *text, size_t size)
+{
+    char names[LIST] = "";
+    size_t length = 0;
+    for (int i = 0; i < FIT_PARAMS; i++) {
+        const struct fit_estimate *e = &r->estimate[i];
+        if (e->at_bound && !held(e) && !at_natural_bound(r, i))
+            append(names, fit_param_name((enum fit_param)i), e->value, 0);
+    }
+    *text = 0;
+    if (*names)
+        length = (size_t)snprintf(text, size, "On a bound: %s; widen the bounds or measure more "
+                                  "angles.", names);
+    for (int i = 0; i < FIT_PARAMS && length < size; i++)
+        if (at_natural_bound(r, i)) {
+            const char *space = length ? " " : "";
+            length += (size_t)snprintf(text + length, size - length, "%s", space);
+            length += (size_t)natural_bound_text(r, i, text + length, size - length);
+        }
+    return (int)length;
+}
+
 // What the readings do not tell, what can be used instead, and what would help.
 static int not_identified_text(const struct fit_result *r, char *text, size_t size)
 {
@@ -182,8 +232,6 @@ static int model_error_text(const struct fit_result *r, char *text, size_t size)
 
 int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text, size_t size)
 {
-    static const enum fit_param all[] = {FIT_N, FIT_K, FIT_SIGMA, FIT_KS, FIT_KD};
-    char names[LIST];
     switch (w) {
     case FIT_WARN_DHR_ABOVE_ONE:
         return snprintf(
@@ -196,12 +244,10 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
         return snprintf(
             text, size,
             "n = %.3f is below 1, unphysical for a paint or a dielectric: the model does not "
-            "describe this sample, or n is not identified; consider a lower bound of 1.",
+            "describe this sample, or n is not identified; --bounds n=1:8 keeps it "
+            "above.",
             r->params.n);
-    case FIT_WARN_AT_BOUND:
-        list(r, at_bound, all, 5, names);
-        return snprintf(text, size, "On a bound: %s; widen the bounds or measure more angles.",
-                        names);
+    case FIT_WARN_AT_BOUND: return at_bound_text(r, text, size);
     case FIT_WARN_FEW_SWEEPS:
         return snprintf(
             text, size,

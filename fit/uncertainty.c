@@ -134,6 +134,7 @@ static void fill_estimates(const struct fit_options *o, const struct covariance 
         if (isnan(profile[i].lo95 + profile[i].hi95))
             e->lo95 = e->hi95 = (double)NAN;
         e->at_bound = v - l <= ON_BOUND * (h - l) || h - v <= ON_BOUND * (h - l);
+        e->at_lower = e->at_bound && v - l < h - v;
         // No width is no knowledge: a curvature that vanished, or numbers that underflowed.
         e->identified = !e->at_bound && e->u > 0 && e->lo95 < e->hi95 && e->lo95 >= 0.75 * v &&
                         e->hi95 <= 1.25 * v;

@@ -191,6 +191,37 @@ static void only_what_is_identified_is_to_be_used(void **state)
                               "identify sigma = 0.15004, kd = 0.0074: use none of them.");
 }
 
+static void a_bound_of_nature_is_not_to_be_widened(void **state)
+{
+    (void)state;
+    char text[600];
+    struct fit_result r = {.warnings = FIT_WARN_AT_BOUND};
+    struct fit_estimate low = {.value = 0, .u = 0.1, .hi95 = 0.43, .at_bound = true};
+    low.at_lower = true;
+    r.estimate[FIT_K] = low;
+    fit_warning_text(&r, FIT_WARN_AT_BOUND, text, sizeof text);
+    assert_string_equal(text, "k = 0, the least it can be: the readings show no absorption (k up "
+                              "to 0.43 is within the 95 % interval).");
+    r.estimate[FIT_SIGMA] = (struct fit_estimate){.value = 0.6, .u = 0.1, .at_bound = true};
+    r.estimate[FIT_KD] = low;
+    r.estimate[FIT_KD].u = 0; // held there
+    r.estimate[FIT_KD].at_lower = false;
+    fit_warning_text(&r, FIT_WARN_AT_BOUND, text, sizeof text);
+    assert_string_equal(text, "On a bound: sigma = 0.6; widen the bounds or measure more angles. "
+                              "k = 0, the least it can be: the readings show no absorption (k up "
+                              "to 0.43 is within the 95 % interval).");
+    r = (struct fit_result){.warnings = FIT_WARN_AT_BOUND};
+    r.estimate[FIT_N] = low;
+    r.estimate[FIT_N].value = 1;
+    fit_warning_text(&r, FIT_WARN_AT_BOUND, text, sizeof text);
+    assert_string_equal(text, "n = 1, its lower bound: the readings want n below 1. Wider bounds "
+                              "do not help: the model does not describe this sample.");
+    r.estimate[FIT_N].value = 1.4; // somebody's choice
+    fit_warning_text(&r, FIT_WARN_AT_BOUND, text, sizeof text);
+    assert_string_equal(text, "On a bound: n = 1.4; widen the bounds or measure more angles.");
+    assert_true(has(&r, FIT_WARN_AT_BOUND, "n = 1.4"));
+}
+
 static void neighbours_are_found_along_the_signed_angle(void **state)
 {
     (void)state;
@@ -434,6 +465,7 @@ int main(void)
         cmocka_unit_test(measured_paints_reach_the_best_known_delta),
         cmocka_unit_test(unidentified_and_unphysical_fits_are_said_to_be),
         cmocka_unit_test(only_what_is_identified_is_to_be_used),
+        cmocka_unit_test(a_bound_of_nature_is_not_to_be_widened),
         cmocka_unit_test(neighbours_are_found_along_the_signed_angle),
         cmocka_unit_test(one_sweep_and_few_points_are_fitted_with_a_warning),
         cmocka_unit_test(bad_readings_have_their_stop_codes),

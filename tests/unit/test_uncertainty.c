@@ -281,6 +281,8 @@ static void everything_is_finite_on_bounds_and_where_k_vanishes(void **state)
             all_is_finite(&f);
             if (c == 1 || c == 2 || c == 3)
                 assert_true(f.estimate[FIT_N].at_bound && (f.warnings & FIT_WARN_AT_BOUND));
+            if (c <= 3 || c == 7)
+                assert_true(f.estimate[FIT_N].at_lower == (c >= 1 && c <= 3));
             if (c == 5) // no specular part: of n and sigma only the bounds are known
                 assert_near(f.estimate[FIT_N].u, (8 - 0.2) / 2, 0.01);
             if (c == 7) // nothing was free
