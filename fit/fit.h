@@ -149,6 +149,13 @@ enum fit_warning {
     FIT_WARN_MODEL_ERROR = 1 << 5 // residuals larger (chi2, with u_per_sr) or smoother than noise
 };
 
+// What FIT_WARN_MODEL_ERROR was raised by.
+enum fit_model_error {
+    FIT_RESIDUALS_LARGE = 1 << 0,  // least_chi2_per_dof
+    FIT_RESIDUALS_SMOOTH = 1 << 1, // residual_lag1
+    FIT_RESIDUALS_SIGNS = 1 << 2   // residual_signs_z: runs of one sign, which no outlier can sway
+};
+
 // FIT_PAPER reports params, delta and u of what its algorithm ended with; lo95 and hi95 belong to
 // the data and so to the optimum next to it, and need not include it.
 struct fit_result {
@@ -166,6 +173,10 @@ struct fit_result {
     // Autocorrelation of neighbouring residuals within a sweep, each divided by its noise, at the
     // fit with weights 1/noise^2; NAN: none.
     double residual_lag1;
+    // How many standard deviations more neighbours share a sign there than half of them.
+    double residual_signs_z;
+    double least_chi2_per_dof; // at the fit with weights 1/u^2; NAN without u_per_sr
+    unsigned model_error;      // of fit_model_error; 0 without FIT_WARN_MODEL_ERROR
     double largest_per_sr; // reading, without its sign
     unsigned warnings;      // of fit_warning
     long evaluations;       // of the whole data set

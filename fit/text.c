@@ -213,21 +213,26 @@ static int not_identified_text(const struct fit_result *r, char *text, size_t si
                     *use ? use : "none of them", *advice ? ". What helps most: " : "", advice);
 }
 
+// By which measure the warning came.
 static int model_error_text(const struct fit_result *r, char *text, size_t size)
 {
-    static const char advice[] = "the intervals hold noise only, not what the model cannot follow";
-    if (isnan(r->residual_lag1))
-        return snprintf(text, size,
-                        "Residuals are larger than noise (chi2 per degree of freedom %.3g): %s.",
-                        r->chi2_per_dof, advice);
-    if (isnan(r->chi2_per_dof))
-        return snprintf(text, size,
-                        "Residuals are smoother than noise (neighbours correlate by %.2f): %s.",
-                        r->residual_lag1, advice);
+    char large[100] = "", smooth[80] = "", signs[120] = "";
+    if (r->model_error & FIT_RESIDUALS_LARGE)
+        snprintf(large, sizeof large,
+                 "larger than noise (chi2 per degree of freedom %.3g with weights 1/u^2)",
+                 r->least_chi2_per_dof);
+    if (r->model_error & FIT_RESIDUALS_SMOOTH)
+        snprintf(smooth, sizeof smooth, "%ssmoother than noise (neighbours correlate by %.2f)",
+                 *large ? ", " : "", r->residual_lag1);
+    else if (r->model_error & FIT_RESIDUALS_SIGNS)
+        snprintf(signs, sizeof signs,
+                 "%sof one sign in runs (neighbours share it more often than noise would, by %.1f "
+                 "standard deviations)",
+                 *large ? ", " : "", r->residual_signs_z);
     return snprintf(text, size,
-                    "Residuals are larger or smoother than noise (chi2 per degree of freedom %.3g, "
-                    "neighbours correlate by %.2f): %s.",
-                    r->chi2_per_dof, r->residual_lag1, advice);
+                    "Residuals are %s%s%s: the intervals hold noise only, not what the model "
+                    "cannot follow.",
+                    large, smooth, signs);
 }
 
 int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text, size_t size)

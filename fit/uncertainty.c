@@ -149,6 +149,19 @@ static double largest(const struct fit_data *d)
     return most;
 }
 
+// Chance does these once in 1,000,000, in 10,000 and in 1000 fits.
+static unsigned model_error(const struct residuals *res, double chi2_per_dof, double dof)
+{
+    unsigned all = 0;
+    if (chi2_per_dof > 1 + 5 * sqrt(2 / dof))
+        all |= FIT_RESIDUALS_LARGE;
+    if (res->z > 3.7 && res->lag1 > 0.1)
+        all |= FIT_RESIDUALS_SMOOTH;
+    if (res->signs_z > 3.1)
+        all |= FIT_RESIDUALS_SIGNS;
+    return all;
+}
+
 static void fill_warnings(const struct fit_options *o, const struct residuals *res, double dof,
                           struct fit_result *r)
 {
@@ -168,9 +181,8 @@ static void fill_warnings(const struct fit_options *o, const struct residuals *r
         r->warnings |= FIT_WARN_SCALE;
     if (res->sweeps < 3)
         r->warnings |= FIT_WARN_FEW_SWEEPS;
-    // Chance does these once in 10,000, in 1000 and in 1,000,000 fits.
-    bool smooth = (res->z > 3.7 && res->lag1 > 0.1) || res->signs_z > 3.1;
-    if (smooth || (dof >= 1 && res->least_chi2 / dof > 1 + 5 * sqrt(2 / dof)))
+    r->model_error = model_error(res, r->least_chi2_per_dof, dof);
+    if (r->model_error)
         r->warnings |= FIT_WARN_MODEL_ERROR;
 }
 
@@ -234,7 +246,9 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
     if (control->stop)
         return FIT_E_CANCELED;
     r.chi2_per_dof = cov.dof >= 1 ? res.chi2 / cov.dof : (double)NAN;
+    r.least_chi2_per_dof = cov.dof >= 1 ? res.least_chi2 / cov.dof : (double)NAN;
     r.residual_lag1 = res.lag1;
+    r.residual_signs_z = res.signs_z;
     r.largest_per_sr = largest(data);
     fill_warnings(options, &res, cov.dof, &r);
     *ret_result = r;

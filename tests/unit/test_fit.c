@@ -191,6 +191,26 @@ static void only_what_is_identified_is_to_be_used(void **state)
                               "identify sigma = 0.15004, kd = 0.0074: use none of them.");
 }
 
+static void a_model_error_is_said_by_what_showed_it(void **state)
+{
+    (void)state;
+    struct fit_result r = {.warnings = FIT_WARN_MODEL_ERROR,
+                           .residual_lag1 = 0.02,
+                           .residual_signs_z = 4.21,
+                           .least_chi2_per_dof = 3.456,
+                           .model_error = FIT_RESIDUALS_SIGNS};
+    assert_true(has(&r, FIT_WARN_MODEL_ERROR,
+                    "Residuals are of one sign in runs (neighbours share it more often than noise "
+                    "would, by 4.2 standard deviations): the intervals hold noise only"));
+    r.model_error = FIT_RESIDUALS_LARGE;
+    assert_true(has(&r, FIT_WARN_MODEL_ERROR,
+                    "larger than noise (chi2 per degree of freedom 3.46 with weights 1/u^2): the"));
+    r.residual_lag1 = 0.4;
+    r.model_error = FIT_RESIDUALS_LARGE | FIT_RESIDUALS_SMOOTH | FIT_RESIDUALS_SIGNS;
+    assert_true(has(&r, FIT_WARN_MODEL_ERROR, "1/u^2), smoother than noise (neighbours correlate "
+                                              "by 0.40): the intervals"));
+}
+
 static void a_bound_of_nature_is_not_to_be_widened(void **state)
 {
     (void)state;
@@ -465,6 +485,7 @@ int main(void)
         cmocka_unit_test(measured_paints_reach_the_best_known_delta),
         cmocka_unit_test(unidentified_and_unphysical_fits_are_said_to_be),
         cmocka_unit_test(only_what_is_identified_is_to_be_used),
+        cmocka_unit_test(a_model_error_is_said_by_what_showed_it),
         cmocka_unit_test(a_bound_of_nature_is_not_to_be_widened),
         cmocka_unit_test(neighbours_are_found_along_the_signed_angle),
         cmocka_unit_test(one_sweep_and_few_points_are_fitted_with_a_warning),
