@@ -36,6 +36,11 @@ const char *fit_param_name(enum fit_param p)
     return p < FIT_PARAMS ? name[p] : "?";
 }
 
+static bool held(const struct fit_estimate *e) // by options, not by the data
+{
+    return e->at_bound && e->u == 0;
+}
+
 // With two digits of u and no exponent where that is short; four digits where nothing tells u.
 static int value_text(double value, double u, char *text, size_t size)
 {
@@ -67,11 +72,6 @@ static void list(const struct fit_result *r, bool (*wanted)(const struct fit_est
         if (wanted(e))
             append(text, fit_param_name(which[i]), e->value, e->at_bound ? 0 : e->u);
     }
-}
-
-static bool held(const struct fit_estimate *e) // by options, not by the data
-{
-    return e->at_bound && e->u == 0;
 }
 
 static bool unidentified(const struct fit_estimate *e)
@@ -111,15 +111,18 @@ static void percent_text(double part, char *text, size_t size)
     snprintf(text, size, "%.*f %%", before < 1 ? 1 - before : 0, 100 * part);
 }
 
-// The parameter that gains most, of those that are not identified if there are any.
+// The parameter that gains most, of those that are not identified if there are any; none that is
+// held.
 static int most_helped(const struct fit_result *r, const struct fit_advice *a)
 {
     int most = 0;
-    double most_gain = 0;
+    double most_gain = -HUGE_VAL;
     for (int i = 0; i < FIT_PARAMS; i++) {
         const double ratio = a->u[i] > 0 ? r->estimate[i].u / a->u[i] : 0;
+        if (held(&r->estimate[i]))
+            continue;
         const double gain = r->estimate[i].identified ? -1 / (1 + ratio) : ratio;
-        if (i == 0 || gain > most_gain) {
+        if (gain > most_gain) {
             most_gain = gain;
             most = i;
         }

@@ -230,6 +230,24 @@ static void better_weights_are_advised_for_nothing(void **state)
     readings_free(&r);
 }
 
+static void advice_speaks_of_no_parameter_that_is_held(void **state)
+{
+    (void)state;
+    struct readings r = readings_paper();
+    struct fit_options o = fit_options_default();
+    o.lower.n = o.upper.n = 1.5;
+    o.lower.k = o.upper.k = 0.02;
+    readings_measure(&r, &truth[0], 0.02, 1e-5, 3);
+    struct fit_result f = fit(&r, &o, true);
+    for (int i = 0; i < f.advice_count; i++) {
+        char text[300];
+        fit_advice_text(&f, i, text, sizeof text);
+        assert_null(strstr(text, "u(n)"));
+        assert_null(strstr(text, "u(k)"));
+    }
+    readings_free(&r);
+}
+
 static void nothing_is_advised_where_nothing_tells_noise(void **state)
 {
     (void)state;
@@ -251,6 +269,7 @@ int main(void)
         cmocka_unit_test(the_best_comes_first_and_says_its_numbers),
         cmocka_unit_test(sweeps_that_were_measured_are_not_advised),
         cmocka_unit_test(better_weights_are_advised_for_nothing),
+        cmocka_unit_test(advice_speaks_of_no_parameter_that_is_held),
         cmocka_unit_test(nothing_is_advised_where_nothing_tells_noise),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
