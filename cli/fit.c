@@ -54,7 +54,8 @@ static const struct option_row rows[] = {
     {"--diffuse", OPTION_TEXT, offsetof(struct options, words.diffuse), "D", 0, 0,
      "paper: kd/cos(theta_i), or lambert: kd/pi (paper)"},
     {"--bounds", OPTION_TEXT, offsetof(struct options, words.bounds), "LIST", 0, 0,
-     "n=0.2:8,k=0:10,..."},
+     "of some or all, as NAME=LOW:HIGH; equal ones hold it, k=0:0 "
+     "(n=0.2:8,k=0:10,sigma=0.01:0.6,ks=0:1.5,kd=0:0.5)"},
     {"--seed", OPTION_INT, offsetof(struct options, seed), "N", 0, 4294967295.0,
      "of the search (1)"},
     {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64,

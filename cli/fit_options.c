@@ -3,6 +3,7 @@
 
 #include "base/options.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -23,16 +24,30 @@ static int choose(const char *option, const char *word, const char *const *words
     return gon_fail(err, GON_E_INPUT, "%s '%s': allowed: %s", option, word, all);
 }
 
+// As a person writes it: no exponent below 1e15, no zeros at the end.
+static const char *plain(double x, char text[40])
+{
+    snprintf(text, 40, fabs(x) < 1e15 ? "%.9f" : "%g", x);
+    if (strchr(text, '.')) {
+        size_t length = strlen(text);
+        while (text[length - 1] == '0')
+            length--;
+        text[length - (text[length - 1] == '.')] = 0;
+    }
+    return text;
+}
+
 static int take_weights(const char *word, struct fit_options *o, struct gon_error *err)
 {
     static const char *const words[] = {"uniform", "dense:G", "relative", "variance", NULL};
     double g;
+    char most[40];
     if (!strncmp(word, "dense:", 6)) {
         if (options_real(word + 6, &g) < 0 || g <= 0 || g > FIT_DENSE_MOST)
             return gon_fail(err, GON_E_INPUT,
                             "--weights dense:G needs a number > 0 after the colon, not '%s'; at "
-                            "most %g",
-                            word + 6, FIT_DENSE_MOST);
+                            "most %s",
+                            word + 6, plain(FIT_DENSE_MOST, most));
         o->weighting = FIT_DENSE;
         o->dense_g = g;
         return GON_OK;
@@ -60,16 +75,21 @@ static int find_param(const char *name)
     return p;
 }
 
-static int check_bound(enum fit_param p, double low, double high, struct gon_error *err)
+// low_text, high_text: as they were typed.
+static int check_bound(enum fit_param p, double low, double high, const char *low_text,
+                       const char *high_text, struct gon_error *err)
 {
     double least, most;
+    char from[40], to[40];
     fit_param_range(p, &least, &most);
-    if (!(low < high))
-        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is empty; low must be below high",
-                        fit_param_name(p), low, high);
+    if (low > high)
+        return gon_fail(err, GON_E_INPUT,
+                        "--bounds %s: %s:%s is empty; low must not be above high (equal: held)",
+                        fit_param_name(p), low_text, high_text);
     if (low < least || high > most)
-        return gon_fail(err, GON_E_INPUT, "--bounds %s: %g:%g is out of range; allowed %g..%g",
-                        fit_param_name(p), low, high, least, most);
+        return gon_fail(err, GON_E_INPUT, "--bounds %s: %s:%s is out of range; allowed %s..%s",
+                        fit_param_name(p), low_text, high_text, plain(least, from),
+                        plain(most, to));
     return GON_OK;
 }
 
@@ -92,7 +112,7 @@ static int take_bound(char *text, unsigned *given, struct fit_options *o, struct
     if (*given >> p & 1)
         return gon_fail(err, GON_E_INPUT, "--bounds: %s is given twice", text);
     *given |= 1u << p;
-    int rc = check_bound((enum fit_param)p, low, high, err);
+    int rc = check_bound((enum fit_param)p, low, high, equals + 1, colon + 1, err);
     if (rc == 0) {
         *bound_of(&o->lower, p) = low;
         *bound_of(&o->upper, p) = high;

@@ -32,13 +32,16 @@ static void parameter(struct table *t, const json_t *params, const char *name)
     double u = number(p, "u");
     bool at_bound = json_is_true(json_object_get(p, "at_bound"));
     bool identified = json_is_true(json_object_get(p, "identified"));
+    bool held = at_bound && u == 0; // equal bounds
     table_cell(t, "%s", name);
     cell(t, number(p, "value"), u);
     cell(t, u, u);
     cell(t, number(p, "lo95"), u);
     cell(t, number(p, "hi95"), u);
-    table_cell(t, "%s%s", at_bound ? "at its bound" : identified ? "" : "not identified",
-               at_bound && !identified ? ", not identified" : "");
+    table_cell(t, "%s", held         ? "held by its bounds"
+                        : at_bound   ? "at its bound, not identified"
+                        : identified ? ""
+                                     : "not identified");
 }
 
 static void derived(struct table *t, const json_t *all, const char *key, const char *name,

@@ -160,6 +160,17 @@ def test_fit_finds_the_reference_optimum():
     assert fit_json(GOLDEN / "golden_fit_a.csv", "--seed", "3")["params"] == f["params"]
 
 
+def test_default_bounds_are_documented():
+    text = " ".join(gonio("fit", "--help").stdout.split())
+    assert "(n=0.2:8,k=0:10,sigma=0.01:0.6,ks=0:1.5,kd=0:0.5)" in text
+    data = GOLDEN / "golden_fit_a.csv"
+    told = fit_json(data, "--bounds", "n=0.2:8,k=0:10,sigma=0.01:0.6,ks=0:1.5,kd=0:0.5")
+    assert told["params"] == fit_json(data)["params"]
+    for page in ("doc/gonio.1.scd", "doc/manual.md"):
+        text = " ".join((GOLDEN.parent.parent / page).read_text().split())
+        assert "n is sought from 0.2 to 8, k from 0 to 10, sigma from 0.01 to 0.6, ks from 0 to 1.5" in text
+
+
 def test_fit_speaks_to_people():
     r = gonio("fit", GOLDEN / "golden_fit_a.csv")
     assert r.returncode == 0
@@ -179,6 +190,12 @@ def test_fit_options_change_the_fit(tmp_path):
     assert fit_json(data, "--theta-i", "0,10,30")["points"] < few["points"]
     tight = fit_json(data, "--bounds", "sigma=0.2:0.3")
     assert tight["params"]["sigma"]["at_bound"] and tight["params"]["sigma"]["value"] == 0.2
+    held = fit_json(data, "--bounds", "k=0:0,n=1.5:1.5")
+    for name, value in (("k", 0), ("n", 1.5)):
+        p = held["params"][name]
+        assert p["value"] == p["lo95"] == p["hi95"] == value and p["u"] == 0
+    r = gonio("fit", data, "--bounds", "k=0:0,n=1.5:1.5")
+    assert r.stdout.count("\theld by its bounds\n") == 2 and "separate" not in r.stderr
     trace = tmp_path / "trace.csv"
     fit_json(data, "--trace", trace, "--theta-i-max", "10")
     lines = trace.read_text().splitlines()
@@ -209,7 +226,7 @@ def test_fit_refuses_what_is_not_data(tmp_path, text, says):
     (["--method", "magic"], "allowed: memetic, paper"),
     (["--bounds", "n=3:1"], "is empty"),
     (["--weights", "variance"], "has no uncertainty for every value (column u_f_r)"),
-    (["--bounds", "k=-5:-1"], "--bounds k: -5:-1 is out of range; allowed 0..1e+06"),
+    (["--bounds", "k=-5:-1"], "--bounds k: -5:-1 is out of range; allowed 0..1000000"),
     (["--column", "nothing"], "nothing"),
     (["--theta-i", "91"], "0..90"),
     (["--theta-i", "1"], ""),

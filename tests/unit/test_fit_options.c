@@ -21,6 +21,9 @@ static void words_change_what_they_name(void **state)
     assert_int_equal(o.diffuse, BRDF_DIFFUSE_LAMBERT);
     assert_true(o.lower.n == 1 && o.upper.n == 3 && o.lower.kd == 0 && o.upper.kd == 0.1);
     assert_true(o.lower.sigma == before.lower.sigma && o.upper.sigma == before.upper.sigma);
+    w = (struct fit_words){.bounds = "k=0:0,n=1.5:1.5"}; // held
+    assert_int_equal(fit_words_take(&w, &o, NULL), 0);
+    assert_true(o.lower.k == 0 && o.upper.k == 0 && o.lower.n == 1.5 && o.upper.n == 1.5);
     w = (struct fit_words){"variance", NULL, NULL, NULL};
     assert_int_equal(fit_words_take(&w, &o, NULL), 0);
     assert_int_equal(o.weighting, FIT_VARIANCE);
@@ -47,16 +50,17 @@ static void wrong_words_are_refused_by_name(void **state)
     refuses((struct fit_words){.method = "simplex"}, "allowed: memetic, paper");
     refuses((struct fit_words){.bounds = "n=1"}, "NAME=LOW:HIGH");
     refuses((struct fit_words){.bounds = "n=1:2,q=1:2"}, "no parameter 'q'");
-    refuses((struct fit_words){.bounds = "n=2:1"}, "is empty");
+    refuses((struct fit_words){.bounds = "n=2:1"},
+            "--bounds n: 2:1 is empty; low must not be above high (equal: held)");
     refuses((struct fit_words){.bounds = "n=1:nan"}, "not two numbers");
     refuses((struct fit_words){.bounds = "k=-5:-1"},
-            "--bounds k: -5:-1 is out of range; allowed 0..1e+06");
+            "--bounds k: -5:-1 is out of range; allowed 0..1000000");
     refuses((struct fit_words){.bounds = "sigma=0:0.1"},
-            "--bounds sigma: 0:0.1 is out of range; allowed 1e-06..1000");
+            "--bounds sigma: 0:0.1 is out of range; allowed 0.000001..1000");
     refuses((struct fit_words){.bounds = "n=1:1e308"},
-            "--bounds n: 1:1e+308 is out of range; allowed 1e-06..1e+06");
+            "--bounds n: 1:1e308 is out of range; allowed 0.000001..1000000");
     refuses((struct fit_words){.bounds = "n=1:2,kd=0:1,n=1:3"}, "--bounds: n is given twice");
-    refuses((struct fit_words){.weights = "dense:1e300"}, "not '1e300'; at most 1e+12");
+    refuses((struct fit_words){.weights = "dense:1e300"}, "not '1e300'; at most 1000000000000");
 }
 
 static void angles_are_a_list(void **state)
