@@ -60,8 +60,9 @@ static const struct option_row rows[] = {
      "of the search (1)"},
     {"--threads", OPTION_INT, offsetof(struct options, threads), "N", 1, 64,
      "share the work; the result is the same (1)"},
-    {"--bootstrap", OPTION_INT, offsetof(struct options, bootstrap), "N", 0, 100000,
-     "fit N data sets that might have been measured: u and intervals by repetition (0)"},
+    {"--bootstrap", OPTION_INT, offsetof(struct options, bootstrap), "N", 0, 0,
+     "fit N data sets, 40 to 100000, that might have been measured: u and intervals by repetition "
+     "(0: none)"},
     {"--trace", OPTION_TEXT, offsetof(struct options, trace), "FILE", 0, 0,
      "write each generation's Delta as CSV"},
     {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
@@ -174,10 +175,10 @@ static int set_options(const struct options *o, struct fit_options *options, str
 {
     int rc = fit_words_take(&o->words, options, err);
     rc = rc < 0 ? rc : fit_paper_take(&o->paper, options, err);
+    rc = rc < 0 ? rc : fit_bootstrap_take(o->bootstrap, options, err);
     if (o->seed >= 0)
         options->seed = (uint64_t)o->seed;
     options->threads = o->threads > 0 ? (int)o->threads : 1;
-    options->bootstrap = (int)o->bootstrap;
     options->canceled = canceled;
     return rc;
 }

@@ -24,10 +24,17 @@ static int choose(const char *option, const char *word, const char *const *words
     return gon_fail(err, GON_E_INPUT, "%s '%s': allowed: %s", option, word, all);
 }
 
-// As a person writes it: no exponent below 1e15, no zeros at the end.
+// As a person writes it: no exponent below 1e15, "1e100" above, no zeros at the end.
 static const char *plain(double x, char text[40])
 {
-    snprintf(text, 40, fabs(x) < 1e15 ? "%.9f" : "%g", x);
+    if (!(fabs(x) < 1e15)) {
+        snprintf(text, 40, "%g", x);
+        char *plus = strchr(text, '+');
+        if (plus)
+            memmove(plus, plus + 1, strlen(plus));
+        return text;
+    }
+    snprintf(text, 40, "%.9f", x);
     if (strchr(text, '.')) {
         size_t length = strlen(text);
         while (text[length - 1] == '0')
@@ -190,6 +197,17 @@ int fit_paper_take(const struct fit_paper_words *w, struct fit_options *options,
     if (rc < 0)
         return rc;
     options->paper = p;
+    return GON_OK;
+}
+
+int fit_bootstrap_take(long replicas, struct fit_options *options, struct gon_error *err)
+{
+    if (replicas != 0 && (replicas < FIT_LEAST_REPLICAS || replicas > FIT_MOST_REPLICAS))
+        return gon_fail(err, GON_E_INPUT,
+                        "--bootstrap %ld is out of range; allowed 0, or %d..%d (a 95 %% interval "
+                        "needs one replica beyond each end)",
+                        replicas, FIT_LEAST_REPLICAS, FIT_MOST_REPLICAS);
+    options->bootstrap = (int)replicas;
     return GON_OK;
 }
 

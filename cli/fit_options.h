@@ -4,7 +4,7 @@
 #include "base/err.h"
 #include "fit/fit.h"
 
-enum { FIT_MOST_ANGLES = 64 };
+enum { FIT_MOST_ANGLES = 64, FIT_LEAST_REPLICAS = 40, FIT_MOST_REPLICAS = 100000 };
 
 struct fit_words { // NULL: not given
     const char *weights; // "uniform", "dense:G", "relative", "variance"
@@ -28,6 +28,9 @@ int fit_words_take(const struct fit_words *words, struct fit_options *options,
 // The same for the paper's algorithm, which must be the method when one of them is given.
 int fit_paper_take(const struct fit_paper_words *words, struct fit_options *options,
                    struct gon_error *err);
+
+// 0 or FIT_LEAST_REPLICAS..FIT_MOST_REPLICAS.
+int fit_bootstrap_take(long replicas, struct fit_options *options, struct gon_error *err);
 
 // "0,10,20.5" into degrees: the count. option: for messages.
 int fit_angles_take(const char *option, const char *text, double *ret_deg, int most,

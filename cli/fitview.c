@@ -92,6 +92,10 @@ static void bootstrap_rows(struct table *t, const json_t *b)
     char note[80], name[40];
     if (!b)
         return;
+    if (!(number(b, "replicas") > 0)) {
+        text_row(t, "bootstrap", "none: nothing tells the noise of so few readings");
+        return;
+    }
     snprintf(note, sizeof note, "of %.0f replicas, %s noise", number(b, "replicas"),
              json_string_value(json_object_get(b, "noise")));
     for (int i = 0; i < 5; i++) {

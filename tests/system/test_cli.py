@@ -230,6 +230,7 @@ def test_fit_refuses_what_is_not_data(tmp_path, text, says):
     (["--column", "nothing"], "nothing"),
     (["--theta-i", "91"], "0..90"),
     (["--theta-i", "1"], ""),
+    (["--bootstrap", "1"], "--bootstrap 1 is out of range; allowed 0, or 40..100000"),
 ])
 def test_fit_refuses_wrong_options(args, says):
     r = gonio("fit", GOLDEN / "golden_fit_a.csv", *args)

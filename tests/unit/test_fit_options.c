@@ -105,6 +105,22 @@ static void words_of_the_papers_algorithm(void **state)
     refuses_paper((struct fit_paper_words){.scaling = "sigma"}, FIT_PAPER, "none, linear");
 }
 
+static void too_few_replicas_are_refused(void **state)
+{
+    (void)state;
+    struct fit_options o = fit_options_default();
+    struct gon_error err = {0};
+    static const long wrong[] = {-1, 1, 39, 100001};
+    assert_int_equal(fit_bootstrap_take(0, &o, &err), 0);
+    assert_int_equal(fit_bootstrap_take(40, &o, &err), 0);
+    assert_int_equal(o.bootstrap, 40);
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(fit_bootstrap_take(wrong[i], &o, &err), GON_E_INPUT);
+    fit_bootstrap_take(1, &o, &err);
+    assert_non_null(strstr(err.text, "--bootstrap 1 is out of range; allowed 0, or 40..100000"));
+    assert_int_equal(o.bootstrap, 40);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -112,6 +128,7 @@ int main(void)
         cmocka_unit_test(wrong_words_are_refused_by_name),
         cmocka_unit_test(words_of_the_papers_algorithm),
         cmocka_unit_test(angles_are_a_list),
+        cmocka_unit_test(too_few_replicas_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
