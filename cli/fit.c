@@ -113,6 +113,47 @@ static int filter_of(const struct options *o, struct dataset_filter *ret_filter,
     return GON_OK;
 }
 
+// Each angle must be there: a mistyped one would pass for a good validation of the others, or for
+// a smaller fit. The encoder's angle may differ from the plan's by a little.
+static int check_angle(const struct dataset *data, const char *option, double theta_i_deg,
+                       struct gon_error *err)
+{
+    for (size_t i = 0; i < data->count; i++)
+        if (fabs(units_deg(data->theta_i_rad[i]) - theta_i_deg) < 0.01)
+            return GON_OK;
+    return gon_fail(err, GON_E_INPUT, "%s %g: %s has no sweep at that theta_i", option, theta_i_deg,
+                    data->source);
+}
+
+static int check_held_out(const struct dataset *data, const struct fit_hold_out *h,
+                          struct gon_error *err)
+{
+    int rc = GON_OK;
+    for (int i = 0; i < h->count && rc == GON_OK; i++)
+        rc = check_angle(data, "--hold-out", h->theta_i_deg[i], err);
+    return rc;
+}
+
+// What --hold-out takes out again is looked for when it is read.
+static int check_chosen(const struct dataset *data, const struct dataset_filter *f,
+                        struct gon_error *err)
+{
+    int rc = GON_OK;
+    for (int i = 0; i < f->theta_i_count && rc == GON_OK; i++) {
+        const double angle_deg = f->theta_i_deg[i];
+        bool held_out = false;
+        for (int j = 0; j < f->without_count; j++)
+            held_out = held_out || f->without_deg[j] == angle_deg;
+        if (held_out)
+            continue;
+        if (angle_deg > f->theta_i_max_deg)
+            return gon_fail(err, GON_E_INPUT, "--theta-i %g is above the largest theta_i, %g deg",
+                            angle_deg, f->theta_i_max_deg);
+        rc = check_angle(data, "--theta-i", angle_deg, err);
+    }
+    return rc;
+}
+
 // A number, a name, or a .gonio file is a campaign; anything else is a CSV. A campaign brings the
 // options of its configuration.
 static int load_campaign(const struct options *o, const char *file, struct dataset_filter *filter,
@@ -162,6 +203,7 @@ static int load(const struct options *o, const char *file, struct dataset *ret_d
     bool campaign;
     int rc = filter_of(o, &filter, err);
     rc = rc < 0 ? rc : load_file(o, file, &filter, ret_data, options, &campaign, err);
+    rc = rc < 0 ? rc : check_chosen(ret_data, &filter, err);
     if (rc < 0)
         return rc;
     if (!campaign && ret_data->u_per_sr)
@@ -225,22 +267,6 @@ static int search(const struct dataset *data, const struct options *o, struct fi
     if (trace && fclose(trace) != 0 && rc == 0)
         rc = gon_fail(err, GON_E_SYSTEM, "--trace %s: %s", o->trace, strerror(errno));
     return rc;
-}
-
-// Each angle must be there: a mistyped one would pass for a good validation of the others. The
-// encoder's angle may differ from the plan's by a little.
-static int check_held_out(const struct dataset *data, const struct fit_hold_out *h,
-                          struct gon_error *err)
-{
-    for (int i = 0; i < h->count; i++) {
-        bool found = false;
-        for (size_t j = 0; j < data->count && !found; j++)
-            found = fabs(units_deg(data->theta_i_rad[j]) - h->theta_i_deg[i]) < 0.01;
-        if (!found)
-            return gon_fail(err, GON_E_INPUT, "--hold-out %g: %s has no sweep at that theta_i",
-                            h->theta_i_deg[i], data->source);
-    }
-    return GON_OK;
 }
 
 // Reads the sweeps that were not fitted and compares them with the fit.

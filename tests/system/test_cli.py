@@ -188,6 +188,7 @@ def test_fit_options_change_the_fit(tmp_path):
     few = fit_json(data, "--theta-i-max", "30")
     assert few["points"] < 841
     assert fit_json(data, "--theta-i", "0,10,30")["points"] < few["points"]
+    assert fit_json(data, "--theta-i", "0,10,30,45", "--hold-out", "45")["hold_out"]["theta_i_deg"] == [45]
     tight = fit_json(data, "--bounds", "sigma=0.2:0.3")
     assert tight["params"]["sigma"]["at_bound"] and tight["params"]["sigma"]["value"] == 0.2
     held = fit_json(data, "--bounds", "k=0:0,n=1.5:1.5")
@@ -230,6 +231,10 @@ def test_fit_refuses_what_is_not_data(tmp_path, text, says):
     (["--column", "nothing"], "nothing"),
     (["--theta-i", "91"], "0..90"),
     (["--theta-i", "1"], ""),
+    (["--theta-i", "0,11,30,77"], "--theta-i 11: "),
+    (["--theta-i", "0,11,30,77"], "golden_fit_a.csv has no sweep at that theta_i"),
+    (["--theta-i", "0,30,45", "--theta-i-max", "40"], "--theta-i 45 is above the largest theta_i, 40 deg"),
+    (["--theta-i", "0,30,45", "--hold-out", "45,46"], "--hold-out 46: "),
     (["--bootstrap", "1"], "--bootstrap 1 is out of range; allowed 0, or 40..100000"),
 ])
 def test_fit_refuses_wrong_options(args, says):
