@@ -308,6 +308,21 @@ static int validate(const struct options *o, const char *file, struct fit_record
     return rc;
 }
 
+// What was fitted and how, as far as it is not the paper's.
+static void say_what(const struct fit_record *record, const struct dataset *data)
+{
+    const struct fit_options *o = &record->options;
+    char factor[40] = "", diffuse[40] = "";
+    if (o->weighting == FIT_DENSE)
+        snprintf(factor, sizeof factor, ":%.10g", o->dense_g);
+    if (o->diffuse != BRDF_DIFFUSE_PAPER)
+        snprintf(diffuse, sizeof diffuse, ", %s diffuse", fit_diffuse_name(o->diffuse));
+    fprintf(stderr, "%s: %zu points%s, %s%s weights%s, %s, seed %llu, %.0f ms\n", data->source,
+            record->points, data->left_out ? " (others left out by the filter)" : "",
+            fit_weighting_name(o->weighting), factor, diffuse, fit_method_name(o->method),
+            (unsigned long long)o->seed, record->result.elapsed_total_ms);
+}
+
 static int print(const struct fit_record *record, const struct dataset *data, bool json)
 {
     char *text = fit_json(record, json ? 2 : 0);
@@ -319,11 +334,7 @@ static int print(const struct fit_record *record, const struct dataset *data, bo
         puts(text);
     } else {
         json_t *o = json_loads(text, 0, NULL);
-        fprintf(stderr, "%s: %zu points%s, %s weights, %s, seed %llu, %.0f ms\n", data->source,
-                record->points, data->left_out ? " (others left out by the filter)" : "",
-                fit_weighting_name(record->options.weighting),
-                fit_method_name(record->options.method), (unsigned long long)record->options.seed,
-                record->result.elapsed_total_ms);
+        say_what(record, data);
         fitview_print(o);
         json_decref(o);
     }

@@ -2,6 +2,7 @@
 #include "cli/fitview.h"
 
 #include "cli/out.h"
+#include "fit/fit.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -108,11 +109,12 @@ static void bootstrap_rows(struct table *t, const json_t *b)
 
 static void hold_out_row(struct table *t, const json_t *h)
 {
-    char text[200];
+    char text[200], rms[60];
     if (!h)
         return;
-    int length = snprintf(text, sizeof text, "Delta %.3g, rms of residual/model %.2g %%",
-                          number(h, "delta"), 100 * number(h, "rms_relative"));
+    fit_percent_text(number(h, "rms_relative"), rms, sizeof rms);
+    int length = snprintf(text, sizeof text, "Delta %.3g, rms of residual/model %s",
+                          number(h, "delta"), rms);
     if (isfinite(number(h, "chi2_per_point")))
         snprintf(text + length, sizeof text - (size_t)length, ", chi2/point %.3g",
                  number(h, "chi2_per_point"));
@@ -123,7 +125,7 @@ static void advice_row(struct table *t, const json_t *advice)
 {
     const json_t *best = json_array_get(advice, 0);
     char text[400];
-    if (!best)
+    if (!(number(best, "gain") > FIT_LEAST_GAIN)) // as for the warning
         return;
     snprintf(text, sizeof text, "%s", json_string_value(json_object_get(best, "text")));
     text_row(t, "helps most", text);

@@ -132,6 +132,7 @@ enum fit_measurement {
     FIT_MEASUREMENTS
 };
 
+#define FIT_LEAST_GAIN 0.05 // of advice worth a sentence
 struct fit_advice {
     enum fit_measurement what;
     double u[FIT_PARAMS]; // that the parameters would have then, as in fit_estimate.u
@@ -214,6 +215,8 @@ int fit_warning_text(const struct fit_result *r, enum fit_warning w, char *text,
 // What of the `which`-th advice a person needs: "s- and p-polarised laser: u(n) 141 % -> 33 %", for
 // the parameter that gains most. Returns the length that snprintf would.
 int fit_advice_text(const struct fit_result *r, int which, char *text, size_t size);
+// "550 %", "3.9 %", "0.018 %": two digits, and no exponent where a person reads. As snprintf.
+int fit_percent_text(double part, char *text, size_t size);
 const char *fit_measurement_name(enum fit_measurement m); // "nothing", "again", "grazing", ...
 
 // How well parameters describe readings that were held out of the fit. A negative fit_stop on fewer

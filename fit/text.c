@@ -6,8 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define LEAST_GAIN 0.05 // of advice worth a sentence
-
 const char *fit_stop_text(int stop)
 {
     switch (stop) {
@@ -104,11 +102,10 @@ static int measurement_text(const struct fit_advice *a, char *text, size_t size)
     return snprintf(text, size, "?");
 }
 
-// "550 %", "3.9 %", "0.018 %": two digits, and no exponent where a person reads.
-static void percent_text(double part, char *text, size_t size)
+int fit_percent_text(double part, char *text, size_t size)
 {
     const int before = part > 0 ? (int)floor(log10(100 * part)) : 0;
-    snprintf(text, size, "%.*f %%", before < 1 ? 1 - before : 0, 100 * part);
+    return snprintf(text, size, "%.*f %%", before < 1 ? 1 - before : 0, 100 * part);
 }
 
 // The parameter that gains most, of those that are not identified if there are any; none that is
@@ -139,8 +136,8 @@ int fit_advice_text(const struct fit_result *r, int which, char *text, size_t si
     measurement_text(a, what, sizeof what);
     if (e->value > 0 && e->u < 100 * e->value) {
         char now[40], then[40];
-        percent_text(e->u / e->value, now, sizeof now);
-        percent_text(a->u[most] / e->value, then, sizeof then);
+        fit_percent_text(e->u / e->value, now, sizeof now);
+        fit_percent_text(a->u[most] / e->value, then, sizeof then);
         return snprintf(text, size, "%s: u(%s) %s -> %s", what,
                         fit_param_name((enum fit_param)most), now, then);
     }
@@ -209,7 +206,7 @@ static int not_identified_text(const struct fit_result *r, char *text, size_t si
     list(r, identified, others, 2, use);
     if (1.96 * r->ks_r45.u <= 0.25 * r->ks_r45.value) // as for a parameter
         append(use, "ks R(45 deg)", r->ks_r45.value, r->ks_r45.u);
-    if (r->advice_count > 0 && r->advice[0].gain > LEAST_GAIN)
+    if (r->advice_count > 0 && r->advice[0].gain > FIT_LEAST_GAIN)
         fit_advice_text(r, 0, advice, sizeof advice);
     return snprintf(text, size, "These readings do not separate n, k and ks (%s)%s%s: use %s%s%s.",
                     names, *more ? ", nor do they identify " : "", more,

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import re
 import subprocess
 
 import pytest
@@ -178,7 +179,22 @@ def test_fit_speaks_to_people():
     assert set(rows) >= {"parameter", "n", "k", "sigma", "ks", "kd", "ks*R(0)", "ks*R(45)", "DHR(0)", "Delta"}
     assert "not identified" in rows["k"][5] and rows["sigma"][5] == ""
     assert abs(float(rows["sigma"][1]) - 0.15) < 0.001 and float(rows["sigma"][2]) > 0
-    assert "841 points" in r.stderr and "warning: " in r.stderr
+    assert "841 points, uniform weights, memetic, seed 1, " in r.stderr and "warning: " in r.stderr
+    r = gonio("fit", GOLDEN / "golden_fit_a.csv", "--weights", "dense:3.5", "--diffuse", "lambert")
+    assert "841 points, dense:3.5 weights, lambert diffuse, memetic, seed 1, " in r.stderr
+
+
+def test_advice_of_no_gain_is_not_given():
+    data = (GOLDEN / "golden_fit_a.csv", "--bounds", "n=1.5:1.5,k=0:0,ks=0.9:0.9,sigma=0.15:0.15,kd=0.05:0.05")
+    assert fit_json(*data)["advice"][0]["gain"] == 0
+    assert "helps most" not in gonio("fit", *data).stdout
+    assert "helps most" in gonio("fit", GOLDEN / "golden_fit_a.csv").stdout
+
+
+def test_held_out_sweeps_are_told_in_plain_percent():
+    r = gonio("fit", GOLDEN / "golden_fit_a.csv", "--bounds", "ks=0:0.01,kd=0:0.01", "--hold-out", "30")
+    row = next(line for line in r.stdout.splitlines() if line.startswith("held out"))
+    assert re.search(r"rms of residual/model \d{3,} %", row), row
 
 
 def test_fit_options_change_the_fit(tmp_path):
