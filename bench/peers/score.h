@@ -27,6 +27,7 @@ void score_title(const char *what, int tasks, uint64_t seed, int seeds);
 void score_report(const char *what, struct score *s, double gonio_ms);
 
 // How many times faster gonio is than the fastest of `count` scores that reached the optimum in a
-// share of `reached` at least (those of our own making left out), beside what is wanted.
+// share of `reached` at least (those of our own making left out), beside the bar: how many
+// times it should be at least.
 void score_summary(const char *what, struct score *s, int count, double reached, double gonio_ms,
-                   double wanted);
+                   double bar);
