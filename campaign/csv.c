@@ -136,6 +136,17 @@ static int split(const char *from, const char *to, struct csv_field *fields, int
     }
 }
 
+// "campaign: {", "name = x;" or a group's name alone; a column may be called "f (T=20)".
+static bool looks_like_configuration(const char *from, const char *to, int fields)
+{
+    const size_t size = (size_t)(to - from);
+    const struct csv_field all = trimmed(from, to);
+    const char last = all.text[all.size - 1];
+    return memchr(from, '{', size) ||
+           (memchr(from, '=', size) && (last == ';' || last == '(' || fields == 1)) ||
+           (fields == 1 && last == ':');
+}
+
 static int header(struct csv *c, struct gon_error *err)
 {
     const char *from, *to;
@@ -147,6 +158,11 @@ static int header(struct csv *c, struct gon_error *err)
     if (n > MOST_COLUMNS)
         return gon_fail(err, GON_E_INPUT, "%s:%ld: %d columns; at most %d", c->name, c->line, n,
                         MOST_COLUMNS);
+    if (looks_like_configuration(from, to, n))
+        return gon_fail(err, GON_E_INPUT,
+                        "%s:%ld: this is no table but looks like a configuration; the first line "
+                        "must name the columns",
+                        c->name, c->line);
     const char *cr = memchr(from, '\r', (size_t)(to - from));
     if (cr)
         return gon_fail(
@@ -240,7 +256,7 @@ long csv_line(const struct csv *c)
 
 // At most `most` bytes of a file's text for a message: what a terminal would obey becomes '?', in
 // ASCII and in UTF-8 (U+0080 to U+009F); so does what is left of a character that was cut.
-static const char *shown(struct csv_field f, size_t most, char text[128])
+static const char *shown(struct csv_field f, size_t most, char text[CSV_SHOWN])
 {
     size_t used = 0;
     bool cut = f.size > most;
@@ -260,7 +276,7 @@ static const char *shown(struct csv_field f, size_t most, char text[128])
     return text;
 }
 
-static const char *shown_name(const char *name, size_t most, char text[128])
+const char *csv_shown(const char *name, size_t most, char text[CSV_SHOWN])
 {
     return shown((struct csv_field){name, strlen(name)}, most, text);
 }
@@ -274,30 +290,73 @@ int csv_column(const struct csv *c, const char *name)
     return found;
 }
 
-int csv_no_column(const struct csv *c, const char *name, struct gon_error *err)
+const char *const *csv_columns(const struct csv *c)
 {
-    char all[300] = "", text[128];
+    return (const char *const *)c->columns;
+}
+
+// A file may have these for themselves: one of them is no misspelling of another.
+static bool has_a_meaning(const char *name)
+{
+    static const char *const known[] = {"theta_i_deg", "theta_r_deg", "theta_r_signed_deg",
+                                        "dphi_deg",    "f_r",         "u_f_r"};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (!strcmp(name, known[i]))
+            return true;
+    return false;
+}
+
+static const char *misspelled(const struct csv *c, const char *name)
+{
+    const char *words[MOST_COLUMNS + 1];
+    int count = 0;
+    for (int i = 0; i < c->count; i++)
+        if (!has_a_meaning(c->columns[i]))
+            words[count++] = c->columns[i];
+    words[count] = NULL;
+    return options_suggest(name, words);
+}
+
+// typed: a person gave the name, which may be wrong; otherwise the column's name is.
+static int no_column(const struct csv *c, const char *name, bool typed, struct gon_error *err)
+{
+    char all[300] = "", text[CSV_SHOWN];
     if (csv_column(c, name) == -2)
         return gon_fail(err, GON_E_INPUT, "%s:%ld: column '%s' is there twice", c->name,
                         c->header_line, name);
-    const char *meant = options_suggest(name, (const char *const *)c->columns);
+    const char *meant = misspelled(c, name);
     if (meant)
-        return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; did you mean '%s'?", c->name,
-                        c->header_line, name, shown_name(meant, 60, text));
+        return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'%s '%s'%s", c->name,
+                        c->header_line, name, typed ? "; did you mean" : "; rename",
+                        csv_shown(meant, 60, text), typed ? "?" : " to it");
     for (int i = 0; i < c->count; i++) {
         size_t used = strlen(all);
         snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "",
-                 shown_name(c->columns[i], 40, text));
+                 csv_shown(c->columns[i], 40, text));
     }
     return gon_fail(err, GON_E_INPUT, "%s:%ld: no column '%s'; there are %s", c->name,
                     c->header_line, name, all);
+}
+
+int csv_no_column(const struct csv *c, const char *name, struct gon_error *err)
+{
+    return no_column(c, name, false, err);
 }
 
 int csv_need(const struct csv *c, const char *name, int *ret_column, struct gon_error *err)
 {
     const int column = csv_column(c, name);
     if (column < 0)
-        return csv_no_column(c, name, err);
+        return no_column(c, name, false, err);
+    *ret_column = column;
+    return GON_OK;
+}
+
+int csv_choose(const struct csv *c, const char *name, int *ret_column, struct gon_error *err)
+{
+    const int column = csv_column(c, name);
+    if (column < 0)
+        return no_column(c, name, true, err);
     *ret_column = column;
     return GON_OK;
 }
@@ -319,7 +378,7 @@ int csv_fail(const struct csv *c, int column, struct gon_error *err, const char 
     va_end(args);
     char name[128], value[128];
     return gon_fail(err, GON_E_INPUT, "%s:%ld: %s = %s: %s", c->name, c->line,
-                    shown_name(c->columns[column], 60, name), shown(f, 40, value), text);
+                    csv_shown(c->columns[column], 60, name), shown(f, 40, value), text);
 }
 
 static bool digit(char c)

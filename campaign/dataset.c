@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "campaign/dataset.h"
 
+#include "base/options.h"
 #include "base/units.h"
 #include "campaign/csv.h"
 #include "campaign/direction.h"
@@ -8,11 +9,13 @@
 #include "campaign/reduce.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define SAME_ANGLE_DEG 1e-6
+#define RIGHT_ANGLE_RAD 1.6 // a little more than pi/2
 
 struct dataset_filter dataset_filter_all(void)
 {
@@ -162,12 +165,53 @@ static int find_columns(const struct csv *c, const char *column, struct columns 
 {
     int rc = direction_find(c, &k->direction, err);
     if (rc >= 0)
-        rc = csv_need(c, column, &k->value, err);
+        rc = column ? csv_choose(c, column, &k->value, err) : csv_need(c, "f_r", &k->value, err);
     if (rc >= 0)
-        rc = find_u(c, column, &k->u, err);
+        rc = find_u(c, column ? column : "f_r", &k->u, err);
     if (rc >= 0)
         rc = optional(c, "pol_in", &k->pol_in, err);
     return rc >= 0 ? optional(c, "pol_out", &k->pol_out, err) : rc;
+}
+
+// Adds a sentence if there is room for all of it.
+__attribute__((format(printf, 2, 3))) static void note(struct dataset *d, const char *fmt, ...)
+{
+    char text[sizeof d->note];
+    const size_t used = strlen(d->note);
+    va_list args;
+    va_start(args, fmt);
+    const int length = vsnprintf(text, sizeof text, fmt, args);
+    va_end(args);
+    if (used + (size_t)length + 2 < sizeof d->note)
+        snprintf(d->note + used, sizeof d->note - used, "%s%s", used ? " " : "", text);
+}
+
+// u_NAME beside a column NAME is that column's; another may be a misspelt uncertainty.
+static bool may_be_u(const struct csv *c, const char *name)
+{
+    return (*name == 'u' || *name == 'U') && (name[1] != '_' || csv_column(c, name + 2) == -1);
+}
+
+// An optional column that is not there, and one that nobody reads with nearly its name.
+static void note_misspelt(const struct csv *c, const struct columns *k, const char *value,
+                          struct dataset *d)
+{
+    char u[200], shown[CSV_SHOWN];
+    snprintf(u, sizeof u, "u_%s", value);
+    for (const char *const *name = csv_columns(c); *name; name++) {
+        const char *words[4] = {NULL};
+        int count = 0;
+        if (k->u < 0 && may_be_u(c, *name))
+            words[count++] = u;
+        if (k->pol_in < 0 && strcmp(*name, "pol_out") != 0)
+            words[count++] = "pol_in";
+        if (k->pol_out < 0 && strcmp(*name, "pol_in") != 0)
+            words[count++] = "pol_out";
+        const char *meant = strcmp(*name, value) != 0 ? options_suggest(*name, words) : NULL;
+        if (meant)
+            note(d, "Column '%s' is ignored; did you mean '%s'?", csv_shown(*name, 40, shown),
+                 meant);
+    }
 }
 
 static int take_state(const struct csv *c, int column, enum brdf_state *ret_state,
@@ -213,18 +257,26 @@ static int take_rows(struct csv *c, const char *column, const struct dataset_fil
 {
     struct columns k;
     size_t room = 0;
+    double largest_deg = 0;
     int rc = find_columns(c, column, &k, err);
     while (rc >= 0 && (rc = csv_next(c, err)) == 1) {
         struct row r;
         rc = take_row(c, &k, &r, err);
         if (rc < 0)
             return rc;
+        largest_deg = fmax(largest_deg, fmax(r.direction.theta_i_deg, r.direction.theta_r_deg));
         if (passes(filter, r.direction.theta_i_deg))
             rc = add(d, &room, &r, err);
         else
             d->left_out++;
     }
-    return rc >= 0 ? finish(d, column, err) : rc;
+    if (rc >= 0) {
+        note_misspelt(c, &k, column ? column : "f_r", d);
+        if (largest_deg > 0 && largest_deg < RIGHT_ANGLE_RAD)
+            note(d, "All angles are below %g, and are read as degrees: are these radians?",
+                 RIGHT_ANGLE_RAD);
+    }
+    return rc >= 0 ? finish(d, column ? column : "f_r", err) : rc;
 }
 
 int dataset_from_csv(const char *path, const char *column, const struct dataset_filter *filter,
@@ -236,7 +288,7 @@ int dataset_from_csv(const char *path, const char *column, const struct dataset_
     if (rc < 0)
         return rc;
     snprintf(d.source, sizeof d.source, "%s", path);
-    rc = take_rows(c, column ? column : "f_r", filter, &d, err);
+    rc = take_rows(c, column, filter, &d, err);
     csv_close(c);
     if (rc < 0)
         dataset_clear(&d);

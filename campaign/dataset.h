@@ -5,10 +5,11 @@
 // theta_r_signed_deg (>= 0: forward, dphi = 180 deg) or theta_r_deg and dphi_deg; a value column,
 // f_r unless another is named. Used when there: u_f_r (type A, standard uncertainty), pol_in and
 // pol_out (u, s, p, +45, -45, R, L: model/state.h; without the column all are u). Other columns are
-// ignored. CRLF, a byte-order mark and rows that occur twice are fine. Errors are "file:line: ...",
-// GON_E_INPUT: an empty field, what is not a finite number with a decimal point, a ragged row,
-// theta outside [0, 90), a value column that is all zero, u_f_r <= 0, another state of
-// polarisation.
+// ignored, with a note when one is nearly called like an optional one that is not there, and one
+// when no angle reaches 1.6. CRLF, a byte-order mark and rows that occur twice are fine. Errors are
+// "file:line: ...", GON_E_INPUT: an empty field, what is not a finite number with a decimal point,
+// a ragged row, theta outside [0, 90), a value column that is all zero, u_f_r <= 0, another state
+// of polarisation.
 #pragma once
 #include "base/err.h"
 #include "campaign/store.h"
@@ -35,7 +36,8 @@ struct dataset {
     double u_scale;                  // relative standard uncertainty common to all; 0 from a CSV
     size_t left_out;                 // by the filter
     char source[512];
-    char note[200]; // what the numbers are not (reduction_warning); "" when there is nothing to say
+    char note[200]; // what the numbers are not (reduction_warning), or what in the file looks like
+                    // a mistake; "" when there is nothing to say
 };
 
 struct dataset_filter dataset_filter_all(void);

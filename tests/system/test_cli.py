@@ -229,6 +229,8 @@ def test_fit_options_change_the_fit(tmp_path):
     ("theta_i_deg,theta_r_signed_deg,f_r\n0,95,1\n", ":2"),
     ("theta_i_deg,theta_r_signed,f_r\n0,5,1\n", "theta_r"),
     ("theta_i_deg,theta_r_signed_deg,f_r\n0,5,1\n0,6,1\n", "points"),
+    ("theta_i,theta_r_signed_deg,f_r\n0,5,1\n", ":1: no column 'theta_i_deg'; rename 'theta_i' to it"),
+    ("campaign: {\n", ":1: this is no table but looks like a configuration"),
     ("", ""),
 ])
 def test_fit_refuses_what_is_not_data(tmp_path, text, says):
@@ -236,6 +238,17 @@ def test_fit_refuses_what_is_not_data(tmp_path, text, says):
     r = gonio("fit", path)
     assert r.returncode == 2 and "d.csv" in r.stderr and says in r.stderr, r.stderr
     assert r.stdout == ""
+
+
+def test_fit_warns_of_columns_and_angles_that_look_wrong(tmp_path):
+    lines = [l for l in open(GOLDEN / "golden_fit_a.csv") if not l.startswith("#")]
+    path = write(tmp_path / "d.csv", lines[0].strip() + ",polin\n" + "".join(l.strip() + ",s\n" for l in lines[1:]))
+    warning = "Column 'polin' is ignored; did you mean 'pol_in'?"
+    assert f"warning: {warning}\n" in gonio("fit", path).stderr
+    assert warning in fit_json(path)["warnings"]
+    rows = "".join(f"{ti},{tr},{0.1 + 0.01 * tr * ti}\n" for ti in (0, 0.5, 1) for tr in (-1.4, -0.7, 0, 0.6, 1.2))
+    path = write(tmp_path / "r.csv", "theta_i_deg,theta_r_signed_deg,f_r\n" + rows)
+    assert "are these radians?" in gonio("fit", path).stderr
 
 
 @pytest.mark.parametrize("args, says", [

@@ -194,7 +194,7 @@ def test_a_mistake_is_said_and_nothing_is_printed(tmp_path, text, options, says)
 
 @pytest.mark.parametrize("header, says", [
     ("# a comment\ntheta_i_deg,theta_r_deg,dphi_deg,n,k,ks,kd\n", ":2: no column 'sigma'"),
-    ("theta_i_deg,theta_r_deg,dphi_deg,n,k,sgima,ks,kd\n", ":1: no column 'sigma'; did you mean 'sgima'?; or give --sigma"),
+    ("theta_i_deg,theta_r_deg,dphi_deg,n,k,sgima,ks,kd\n", ":1: no column 'sigma'; rename 'sgima' to it; or give --sigma"),
     ("theta_i_deg,theta_r_deg,n,k,sigma,ks,kd\n", ":1: no column 'dphi_deg'"),
     ("theta_i_deg,n,k,sigma,ks,kd\n", ":1: no column 'theta_r_signed_deg'"),
     ("theta_r_deg,dphi_deg,n,k,sigma,ks,kd\n", ":1: no column 'theta_i_deg'"),

@@ -122,6 +122,41 @@ static void uncertainties_belong_to_their_column(void **state)
     dataset_clear(&d);
 }
 
+static void says(const char *text, const char *column, const char *expected)
+{
+    struct dataset d = taken(text, column, NULL);
+    assert_string_equal(d.note, expected);
+    dataset_clear(&d);
+}
+
+static void columns_that_look_misspelt_are_noted(void **state)
+{
+    (void)state;
+    says("theta_i_deg,theta_r_signed_deg,f_r,polin\n10,2,3,s\n", NULL,
+         "Column 'polin' is ignored; did you mean 'pol_in'?");
+    says("theta_i_deg,theta_r_signed_deg,f_r,pol_in,polout\n10,2,3,s,s\n", NULL,
+         "Column 'polout' is ignored; did you mean 'pol_out'?");
+    says("theta_i_deg,theta_r_signed_deg,f_r,u_fr,pol_ni\n10,2,3,1,s\n", NULL,
+         "Column 'u_fr' is ignored; did you mean 'u_f_r'? "
+         "Column 'pol_ni' is ignored; did you mean 'pol_in'?");
+    says("theta_i_deg,theta_r_signed_deg,f_450nm,u_f450nm\n10,2,3,1\n", "f_450nm",
+         "Column 'u_f450nm' is ignored; did you mean 'u_f_450nm'?");
+    // What belongs to another column, is used, or has nothing to do with it.
+    says("theta_i_deg,theta_r_signed_deg,f_r,u_f_r,pol_in,pol_out\n10,2,3,1,s,u\n", NULL, "");
+    says("theta_i_deg,theta_r_signed_deg,f_450nm,f_550nm,u_f_450nm\n10,2,3,4,1\n", "f_550nm", "");
+    says("id,theta_i_deg,theta_r_signed_deg,f_r,point,note,n,unit,sweep,plane,u_theta_i_deg,time\n"
+         "1,10,2,3,1,2,3,4,5,6,7,8\n", NULL, "");
+}
+
+static void angles_that_may_be_radians_are_noted(void **state)
+{
+    (void)state;
+    const char *note = "All angles are below 1.6, and are read as degrees: are these radians?";
+    says("theta_i_deg,theta_r_signed_deg,f_r\n0,-1.48,3\n1.0472,1.5,3\n", NULL, note);
+    says("theta_i_deg,theta_r_signed_deg,f_r\n0,-1.48,3\n1.0472,1.7,3\n", NULL, "");
+    says("theta_i_deg,theta_r_signed_deg,f_r\n0,0,3\n", NULL, "");
+}
+
 static void states_of_polarisation_are_read(void **state)
 {
     (void)state;
@@ -212,7 +247,19 @@ static void bad_files_are_refused(void **state)
     refused("theta_i_deg,theta_r_signed_deg,value\n1,2,3\n", NULL,
             ":1: no column 'f_r'; there are theta_i_deg, theta_r_signed_deg, value");
     refused("theta_i,theta_r_signed_deg,f_r\n1,2,3\n", NULL,
-            ":1: no column 'theta_i_deg'; did you mean 'theta_i'?");
+            ":1: no column 'theta_i_deg'; rename 'theta_i' to it");
+    refused("theta_i,theta_r_deg,dphi_deg,f_r\n1,2,3,4\n", NULL,
+            ":1: no column 'theta_i_deg'; rename 'theta_i' to it"); // theta_r_deg is no misspelling
+    refused("theta_r_deg,dphi_deg,f_r\n1,2,3\n", NULL,
+            ":1: no column 'theta_i_deg'; there are theta_r_deg, dphi_deg, f_r");
+    refused("theta_i_deg,theta_r_signed_deg,fr\n1,2,3\n", NULL,
+            ":1: no column 'f_r'; rename 'fr' to it");
+    const char *const configurations[] = {"campaign: {\n", "campaign:\n{\n", "name = \"a, b\";\n",
+                                          "theta_i_deg = (0, 10, 20);\n", "bench = {\n"};
+    for (int i = 0; i < 5; i++)
+        refused(configurations[i], NULL,
+                ":1: this is no table but looks like a configuration; the first line must name the "
+                "columns");
     refused("theta_i_deg,theta_r_deg,f_r\n1,2,3\n", NULL,
             ":1: no column 'dphi_deg'; there are theta_i_deg, theta_r_deg, f_r");
     refused("theta_i_deg,theta_r_signed_deg,f_r,f_r\n1,2,3,4\n", NULL,
@@ -436,6 +483,8 @@ int main(void)
         cmocka_unit_test(signs_become_half_planes),
         cmocka_unit_test(what_other_programs_write_is_fine),
         cmocka_unit_test(uncertainties_belong_to_their_column),
+        cmocka_unit_test(columns_that_look_misspelt_are_noted),
+        cmocka_unit_test(angles_that_may_be_radians_are_noted),
         cmocka_unit_test(states_of_polarisation_are_read),
         cmocka_unit_test(filters_choose_sweeps),
         cmocka_unit_test(bad_fields_are_named_with_line_and_column),
