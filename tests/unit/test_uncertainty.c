@@ -323,8 +323,25 @@ static void a_warning_says_when_the_model_does_not_follow(void **state)
             if (((f.warnings & FIT_WARN_MODEL_ERROR) != 0) != bump)
                 fail_msg("bump %d, case %d: lag-1 %.2f, warnings %x", bump, c, f.residual_lag1,
                          f.warnings);
+            assert_true((f.model_error != 0) == bump);
             assert_true(bump ? f.residual_lag1 > 0.1 : fabs(f.residual_lag1) < 0.17); // 4.5 sigma
         }
+    readings_free(&r);
+}
+
+// A few wild readings drown the correlation of their neighbours, not the runs of one sign.
+static void wild_readings_do_not_hide_what_the_model_does_not_follow(void **state)
+{
+    (void)state;
+    struct readings r = readings_paper();
+    struct fit_options o = fit_options_default();
+    readings_measure(&r, &truth[0], 0.02, 1e-5, 40);
+    for (size_t i = 0; i < r.count; i++)
+        r.f[i] *= (1 + 0.06 * exp(-pow((r.tr[i] - 0.9) / 0.2, 2))) * (i % 97 == 50 ? 1.6 : 1);
+    struct fit_result f = fit(&r, &o, false);
+    print_message("lag-1 %.2f, signs %.1f\n", f.residual_lag1, f.residual_signs_z);
+    assert_true(f.warnings & FIT_WARN_MODEL_ERROR);
+    assert_true(f.model_error == FIT_RESIDUALS_SIGNS && f.residual_signs_z > 3.1);
     readings_free(&r);
 }
 
@@ -340,6 +357,7 @@ int main(void)
         cmocka_unit_test(common_scale_goes_into_ks_kd_and_what_derives_from_them),
         cmocka_unit_test(everything_is_finite_on_bounds_and_where_k_vanishes),
         cmocka_unit_test(a_warning_says_when_the_model_does_not_follow),
+        cmocka_unit_test(wild_readings_do_not_hide_what_the_model_does_not_follow),
         cmocka_unit_test(without_noise_uncertainties_vanish),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
