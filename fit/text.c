@@ -39,13 +39,21 @@ static bool held(const struct fit_estimate *e) // by options, not by the data
     return e->at_bound && e->u == 0;
 }
 
-// With two digits of u and no exponent where that is short; four digits where nothing tells u.
+static int decimals(double x) // that show two digits of x
+{
+    return 1 - (int)floor(log10(x));
+}
+
+// As many digits as fit u, which are two of u, or two of the value where u is above it; no exponent
+// where that is short. Four digits where nothing tells u.
 static int value_text(double value, double u, char *text, size_t size)
 {
-    const int decimals = u > 0 ? 1 - (int)floor(log10(fmin(u, 1e15))) : 100;
-    if (decimals > 12)
+    const double large = fabs(value);
+    if (!(u > 1e-11 && u < 1e9 && large < 1e9))
         return snprintf(text, size, "%.4g", value);
-    return snprintf(text, size, "%.*f", decimals > 0 ? decimals : 0, value);
+    const int least = decimals(u), more = large > 1e-11 && large < u ? decimals(large) : least;
+    const int shown = more < least + 3 ? more : least + 3;
+    return snprintf(text, size, "%.*f", shown > 0 ? shown : 0, value);
 }
 
 enum { LIST = 200 };
@@ -53,11 +61,12 @@ enum { LIST = 200 };
 // ", " between, what does not fit is left out.
 static void append(char list[LIST], const char *name, double value, double u)
 {
-    char text[40];
+    char text[40], part[80];
     const size_t length = strlen(list);
     value_text(value, u, text, sizeof text);
-    if (length + strlen(name) + strlen(text) + 6 < LIST)
-        snprintf(list + length, LIST - length, "%s%s = %s", length ? ", " : "", name, text);
+    const int size = snprintf(part, sizeof part, "%s%s = %s", length ? ", " : "", name, text);
+    if (length + (size_t)size < LIST)
+        memcpy(list + length, part, (size_t)size + 1);
 }
 
 // "n = 0.2, k = 10": of the parameters where `wanted` says so.

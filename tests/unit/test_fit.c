@@ -185,6 +185,11 @@ static void only_what_is_identified_is_to_be_used(void **state)
     fit_warning_text(&r, FIT_WARN_NOT_IDENTIFIED, text, sizeof text);
     assert_string_equal(text, "These readings do not separate n, k and ks (n = 1.30), nor do they "
                               "identify kd = 0.0074: use sigma = 0.15004.");
+    r = told(true, true, (double)NAN);
+    r.estimate[FIT_K] = (struct fit_estimate){.value = 0.4812, .u = 200}; // not "0"
+    r.estimate[FIT_KS] = (struct fit_estimate){.value = 1.5e99, .u = 1e99};
+    fit_warning_text(&r, FIT_WARN_NOT_IDENTIFIED, text, sizeof text);
+    assert_non_null(strstr(text, "(n = 1.30, k = 0.48, ks = 1.5e+99): use sigma = 0.15004, kd = "));
     r = told(false, false, (double)NAN);
     fit_warning_text(&r, FIT_WARN_NOT_IDENTIFIED, text, sizeof text);
     assert_string_equal(text, "These readings do not separate n, k and ks (n = 1.30), nor do they "
