@@ -245,6 +245,10 @@ static int take_row(const struct csv *c, const struct columns *k, struct row *r,
     r->u = (double)NAN;
     if (rc >= 0 && k->u >= 0)
         rc = csv_real(c, k->u, &r->u, err);
+    if (rc >= 0 && !(fabs(r->f) <= FIT_READING_MOST))
+        rc = csv_fail(c, k->value, err, "beyond what can be fitted; allowed -1e100..1e100");
+    if (rc >= 0 && k->u >= 0 && r->u > FIT_READING_MOST)
+        rc = csv_fail(c, k->u, err, "beyond what can be fitted; allowed up to 1e100");
     if (rc >= 0 && k->u >= 0 && !(r->u > 0))
         rc = csv_fail(c, k->u, err, "a standard uncertainty is above zero");
     if (rc >= 0)

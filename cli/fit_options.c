@@ -24,7 +24,7 @@ static int choose(const char *option, const char *word, const char *const *words
     return gon_fail(err, GON_E_INPUT, "%s '%s': allowed: %s", option, word, all);
 }
 
-// As a person writes it: no exponent below 1e15, "1e100" above, no zeros at the end.
+// As a person writes it: no exponent below 1e15, "1e50" above, no zeros at the end.
 static const char *plain(double x, char text[40])
 {
     if (!(fabs(x) < 1e15)) {

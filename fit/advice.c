@@ -124,7 +124,7 @@ const char *fit_measurement_name(enum fit_measurement m)
     return m < FIT_MEASUREMENTS ? candidates[m].name : "?";
 }
 
-// The different channels in the data, the first ADVICE_CHANNELS of them.
+// The different channels in the data.
 static void channels_of(const struct fit_data *d, struct advice_plan *plan)
 {
     plan->channels = 0;

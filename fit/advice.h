@@ -15,8 +15,8 @@
 #include "fit/covariance.h"
 #include "fit/noise.h"
 
-// Directions of a measurement, and the channels measured in each of them.
-#define ADVICE_CHANNELS 9
+// Directions of a measurement, and the channels measured in each of them: any of the 7 x 7.
+#define ADVICE_CHANNELS 49
 struct advice_plan {
     size_t count;
     const double *theta_i_rad, *theta_r_rad, *dphi_rad;

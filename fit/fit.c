@@ -39,7 +39,7 @@ static bool in_range(double low, double high, double least, double most)
 void fit_param_range(enum fit_param p, double *ret_least, double *ret_most)
 {
     static const double least[FIT_PARAMS] = {1e-6, 0, 1e-6, 0, 0},
-                        most[FIT_PARAMS] = {1e6, 1e6, 1e3, 1e100, 1e100};
+                        most[FIT_PARAMS] = {1e6, 1e6, 1e3, BRDF_STRENGTH_MAX, BRDF_STRENGTH_MAX};
     *ret_least = least[p];
     *ret_most = most[p];
 }

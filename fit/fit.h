@@ -68,6 +68,7 @@ struct fit_paper_options {
 
 #define FIT_GENERATIONS_MOST 1000000
 #define FIT_DENSE_MOST 1e12
+#define FIT_READING_MOST 1e100 // of |f| and u: beyond it squares overflow
 
 struct fit_options {
     enum fit_method method;
@@ -102,7 +103,7 @@ struct fit_estimate {
     double lo95, hi95; // profile likelihood, all five parameters free; widened by u_scale where it
                        // applies; within the bounds
     bool identified;   // not on a bound, and [lo95, hi95] within +-25 % of the value
-    bool at_bound;     // within 1e-6 of the bounds' distance
+    bool at_bound;     // within 1e-6 of the bounds' distance and 1 % of u
     bool at_lower;     // and that is the lower bound; equal bounds, which hold it: false
 };
 

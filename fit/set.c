@@ -31,8 +31,8 @@ static bool reading_ok(const struct fit_data *d, const struct fit_options *o, si
 {
     return d->theta_i_rad[i] >= 0 && d->theta_i_rad[i] < PI / 2 && d->theta_r_rad[i] >= 0 &&
            d->theta_r_rad[i] < PI / 2 && isfinite(d->dphi_rad[i]) && state_ok(d->pol_in, i) &&
-           state_ok(d->pol_out, i) && fabs(d->f_per_sr[i]) <= 1e100 &&
-           (!d->u_per_sr || (d->u_per_sr[i] > 0 && d->u_per_sr[i] <= 1e100)) &&
+           state_ok(d->pol_out, i) && fabs(d->f_per_sr[i]) <= FIT_READING_MOST &&
+           (!d->u_per_sr || (d->u_per_sr[i] > 0 && d->u_per_sr[i] <= FIT_READING_MOST)) &&
            (o->weighting != FIT_RELATIVE || d->f_per_sr[i] != 0);
 }
 

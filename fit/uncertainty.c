@@ -14,7 +14,9 @@
 
 #define PI 3.14159265358979323846
 #define Z95 1.959963984540054
-#define ON_BOUND 1e-6       // of the bounds' distance
+#define ON_BOUND 1e-6     // of the bounds' distance
+#define ON_BOUND_U 0.01   // of u
+#define ROUNDS 8
 #define LEAST_READING 1e-60 // fourth powers of readings stay in the range of doubles
 #define MOST_READING 1e30
 
@@ -119,21 +121,29 @@ static struct fit_derived dhr(const struct covariance *cov, const struct brdf_pa
     return (struct fit_derived){centre, sqrt(sum)};
 }
 
-static void fill_estimates(const struct fit_options *o, const struct covariance *cov,
-                           const double x[FIT_PARAMS], const struct profile profile[FIT_PARAMS],
-                           struct fit_result *r)
+// On the bound, and not only near it by the measure of bounds far apart.
+static bool touches(double distance, double width, double u)
 {
-    struct brdf_params low = o->lower, high = o->upper;
+    return distance <= ON_BOUND * width && !(distance > ON_BOUND_U * u);
+}
+
+// The intervals belong to the optimum `top`, which the reported x need not be (FIT_PAPER).
+static void fill_estimates(const struct fit_options *o, const struct covariance *cov,
+                           const double x[FIT_PARAMS], const double top[FIT_PARAMS],
+                           const struct profile profile[FIT_PARAMS], struct fit_result *r)
+{
+    struct brdf_params low = o->lower, high = o->upper, centre = within_bounds(top, o);
     for (int i = 0; i < FIT_PARAMS; i++) {
         struct fit_estimate *e = &r->estimate[i];
         double l = *param_of(&low, i), h = *param_of(&high, i), v = *param_of(&r->params, i);
         *e = (struct fit_estimate){.value = v, .u = u_of_param(cov, x, i)};
         double scale = i >= FIT_KS && !cov->known[i] ? Z95 * o->u_scale * v : 0;
-        e->lo95 = fmax(l, v - hypot(v - profile[i].lo95, scale));
-        e->hi95 = fmin(h, v + hypot(profile[i].hi95 - v, scale));
+        double c = *param_of(&centre, i);
+        e->lo95 = fmax(l, c - hypot(c - profile[i].lo95, scale));
+        e->hi95 = fmin(h, c + hypot(profile[i].hi95 - c, scale));
         if (isnan(profile[i].lo95 + profile[i].hi95))
             e->lo95 = e->hi95 = (double)NAN;
-        e->at_bound = v - l <= ON_BOUND * (h - l) || h - v <= ON_BOUND * (h - l);
+        e->at_bound = touches(v - l, h - l, e->u) || touches(h - v, h - l, e->u);
         e->at_lower = e->at_bound && v - l < h - v;
         // No width is no knowledge: a curvature that vanished, or numbers that underflowed.
         e->identified = !e->at_bound && e->u > 0 && e->lo95 < e->hi95 && e->lo95 >= 0.75 * v &&
@@ -186,20 +196,23 @@ static void fill_warnings(const struct fit_options *o, const struct residuals *r
         r->warnings |= FIT_WARN_MODEL_ERROR;
 }
 
-// Covariance and profiles at *top, made again while a profile finds a lower place.
+// Covariance and profiles at *top, made again while a profile finds a lower place; where that has
+// no end, nothing is said of intervals.
 static bool explore(const struct fit_set *set, const struct fit_space *space,
                     struct fit_control *control, struct fit_optimum *top, struct covariance *cov,
                     struct profile profile[FIT_PARAMS])
 {
-    for (int round = 0; round < 4; round++) {
+    for (int round = 0; round < ROUNDS; round++) {
         bool better = false;
         if (!covariance_at(set, space, top->x, control, cov) ||
             !profile_intervals(set, space, cov, control, top, profile, &better))
             return false;
         if (!better)
-            break;
+            return true;
     }
-    return true;
+    for (int i = 0; i < FIT_PARAMS; i++)
+        profile[i] = (struct profile){(double)NAN, (double)NAN};
+    return covariance_at(set, space, top->x, control, cov);
 }
 
 int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
@@ -234,7 +247,7 @@ int uncertainty_estimate(const struct fit_data *data, const struct fit_set *set,
     double x[FIT_PARAMS];
     space_of_params(&r.params, x);
     add_scale(&cov, x, options->u_scale);
-    fill_estimates(options, &cov, x, profile, &r);
+    fill_estimates(options, &cov, x, top.x, profile, &r);
     fill_correlation(&cov, &r);
     if (!advise(data, options, &cov, control, &r))
         return FIT_E_CANCELED;

@@ -214,6 +214,29 @@ static void sweeps_that_were_measured_are_not_advised(void **state)
 }
 
 // Uniform weights lose most of what the readings know of kd; saying so costs no reading.
+static void all_channels_of_the_data_are_known(void **state)
+{
+    (void)state;
+    struct readings r = readings_paper();
+    unsigned char in[2000], out[2000];
+    for (size_t i = 0; i < r.count; i++) { // all 49, the linear block last
+        in[i] = (unsigned char)(BRDF_STATES - 1 - i % BRDF_STATES);
+        out[i] = (unsigned char)(BRDF_STATES - 1 - i / BRDF_STATES % BRDF_STATES);
+    }
+    readings_measure(&r, &truth[1], 0.02, 1e-5, 3);
+    struct fit_data d = readings_data(&r, true);
+    struct fit_options o = fit_options_default();
+    struct fit_result f;
+    o.weighting = FIT_VARIANCE;
+    d.pol_in = in;
+    d.pol_out = out;
+    assert_int_equal(fit_run(&d, &o, &f), 0);
+    assert_null(advice_of(&f, FIT_MEASURE_LINEAR_3X3));
+    assert_null(advice_of(&f, FIT_MEASURE_LASER_SP));
+    assert_null(advice_of(&f, FIT_MEASURE_PARALLEL));
+    readings_free(&r);
+}
+
 static void better_weights_are_advised_for_nothing(void **state)
 {
     (void)state;
@@ -268,6 +291,7 @@ int main(void)
         cmocka_unit_test(a_prediction_is_what_the_longer_data_give),
         cmocka_unit_test(the_best_comes_first_and_says_its_numbers),
         cmocka_unit_test(sweeps_that_were_measured_are_not_advised),
+        cmocka_unit_test(all_channels_of_the_data_are_known),
         cmocka_unit_test(better_weights_are_advised_for_nothing),
         cmocka_unit_test(advice_speaks_of_no_parameter_that_is_held),
         cmocka_unit_test(nothing_is_advised_where_nothing_tells_noise),

@@ -292,6 +292,53 @@ static void everything_is_finite_on_bounds_and_where_k_vanishes(void **state)
     readings_free(&r);
 }
 
+static struct fit_result fitted(const struct readings *r, struct fit_options o)
+{
+    const struct fit_data data = readings_data(r, true);
+    struct fit_result f;
+    o.weighting = FIT_VARIANCE;
+    assert_int_equal(fit_run(&data, &o, &f), 0);
+    return f;
+}
+
+// The paper's algorithm may end outside the intervals of the optimum beside it; they stay what they
+// are.
+static void intervals_do_not_depend_on_where_the_search_ended(void **state)
+{
+    (void)state;
+    const struct brdf_params p = {1.5, 0.02, 0.15, 0.9, 0.05};
+    struct readings r = readings_paper();
+    readings_measure(&r, &p, 0.02, 1e-5, 7);
+    struct fit_options o = fit_options_default();
+    const struct fit_result best = fitted(&r, o);
+    o.method = FIT_PAPER;
+    o.paper.generations = 20;
+    const struct fit_result paper = fitted(&r, o);
+    int outside = 0;
+    for (int i = 0; i < FIT_PARAMS; i++) {
+        const struct fit_estimate *e = &best.estimate[i], *q = &paper.estimate[i];
+        outside += q->value < e->lo95 || q->value > e->hi95;
+        assert_near(q->lo95, e->lo95, 0.02 * (e->hi95 - e->lo95));
+        assert_near(q->hi95, e->hi95, 0.02 * (e->hi95 - e->lo95));
+    }
+    assert_true(outside > 0);
+    readings_free(&r);
+}
+
+static void a_bound_far_off_is_not_touched(void **state)
+{
+    (void)state;
+    const struct brdf_params p = {1.5, 0.02, 0.15, 0.9, 0.05};
+    struct readings r = readings_paper();
+    readings_measure(&r, &p, 0.02, 1e-5, 7);
+    struct fit_options o = fit_options_default();
+    o.upper.ks = o.upper.kd = 1e6;
+    const struct fit_result f = fitted(&r, o);
+    assert_false(f.estimate[FIT_KS].at_bound || f.estimate[FIT_KD].at_bound);
+    assert_true(f.estimate[FIT_KD].identified);
+    readings_free(&r);
+}
+
 static void without_noise_uncertainties_vanish(void **state)
 {
     (void)state;
@@ -358,6 +405,8 @@ int main(void)
         cmocka_unit_test(everything_is_finite_on_bounds_and_where_k_vanishes),
         cmocka_unit_test(a_warning_says_when_the_model_does_not_follow),
         cmocka_unit_test(wild_readings_do_not_hide_what_the_model_does_not_follow),
+        cmocka_unit_test(intervals_do_not_depend_on_where_the_search_ended),
+        cmocka_unit_test(a_bound_far_off_is_not_touched),
         cmocka_unit_test(without_noise_uncertainties_vanish),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
