@@ -89,7 +89,7 @@ struct fit_options {
     void *trace_ctx;
 };
 
-// u and the intervals hold what noise does, whatever the weights: from u_per_sr where it is known,
+// u and the intervals hold what noise does, for any weights: from u_per_sr where it is known,
 // else from the residuals (robust against unequal variances). They hold nothing of what the model
 // cannot follow. On a bound: all five parameters stay free in the covariance, each with its bounds
 // as weak prior knowledge (fit/covariance.h), so that u of sigma, kd, ks_r0 and ks_r45 stays what
