@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From volts to absolute BRDF with its uncertainty (metrology: GUM, type A and B kept apart).
+// From volts to absolute BRDF with its uncertainty (GUM: type A and B kept apart).
 //
 //   underfilled  f = [(S - Ds)/(M - Dm)] / [(S0 - Ds0)/(M0 - Dm0)] / (Omega cos theta_r)
 //   overfilled   the same over (Omega cos theta_i), the beam reading being that of the

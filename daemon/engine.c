@@ -126,8 +126,8 @@ static double u_of_mean(double sd, int count)
     return count > 1 ? sd / sqrt(count) : 0.0;
 }
 
-// Underfilled or overfilled f_r with the opening references (metrology.md 1); the last word is
-// reduce's.
+// Underfilled or overfilled f_r (formulas: campaign/reduce.h) with the opening references; the last
+// word is reduce's.
 static void provisional(const struct engine *e, const struct acquire_reading *r, double theta_i_deg,
                         double theta_r_deg, double *ret_f, double *ret_u)
 {

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
-// An Oriental Motor AZ driver as its Modbus registers (controllers.md A), moving one axis of the
-// world. 32-bit values take two registers, upper word first, and are written both in one
-// transaction (except the input command 007D and 0079, whose lower words stand alone). Thread: one.
+// An Oriental Motor AZ driver as its Modbus registers, moving one axis of the world. 32-bit values
+// take two registers, upper word first, and are written both in one transaction (except the input
+// command 007D and 0079, whose lower words stand alone). Thread: one.
+//
+// Source: public drivers, not the manuals HM-60252J and HM-60262E that they cite
+// (asukiaaa/arduino-OrientalAZ:src/OrientalAZ_asukiaaa.hpp, oml_mrtu.cpp, VJ_OrientalMaster.h).
+// From general knowledge and unverified: the command position 00C6/7, operation type 3, triggers
+// -7..-1, and bits 0-4 of the output status 007F (M0_R.., START_R, HOME-END).
 //
 // Modelled: direct data operation 0058..0069 (types 1, 2, 3; trigger 1 and -7..-1), input command
 // 007C/D and its self-clearing twin 0078/9 (STOP, ZHOME, FREE, ALM-RST on their edges; STOP and

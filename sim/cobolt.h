@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The text protocol of a Cobolt 05-01 laser (instruments.md 6 and 12): cmd CR, answer CR LF, in
-// front of the world's laser. Several ports may lead to the same laser. Thread: one.
+// The text protocol of a Cobolt 05-01 laser: cmd CR, answer CR LF, in front of the world's laser.
+// Several ports may lead to the same laser. Thread: one. Source: public drivers, no manual
+// (cobolt-lasers/pycobolt, the vendor's own; microscope's cobolt.py; Micro-Manager's
+// CoboltOfficial.cpp).
 //
 // A command that comes less than 100 ms after the one before is ignored, whole and without an
 // answer; empty lines and line feeds are nothing at all. Settings answer OK, what is not known

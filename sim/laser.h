@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The laser as a physical thing with its controller's state machine (instruments.md 6 and 12): key,
-// interlock, temperatures, warm-up, emission, and the power that comes out of it. Stepped by the
-// time passed in; no I/O. The protocol in front of it is sim/cobolt. Thread: one.
+// The laser as a physical thing with its controller's state machine: key, interlock, temperatures,
+// warm-up, emission, and the power that comes out of it. Stepped by the time passed in; no I/O. The
+// protocol in front of it is sim/cobolt. Thread: one.
+//
+// The states and faults are those of gom? and f? in public drivers of the Cobolt 05 series
+// (sim/cobolt.h), and that the key may have to be cycled after off or a trip is pylablib's; how
+// warmth and power go is chosen here.
 //
 // off -> waiting for temperatures (TEC) -> waiting for the key -> warming up (light, rising) ->
 // completed. Opening the interlock while anything but off is on ends in fault 3 and asks for a key

@@ -11,7 +11,8 @@
 
 enum { LOCKIN_POLES = 4 };
 
-// Bits of SR830's LIAS? (instruments.md 1).
+// Bits of the SR830's LIAS? (pymeasure/pymeasure:pymeasure/instruments/srs/sr830.py, and the
+// manual, which on page 5-23 makes them sticky until read).
 enum lockin_condition {
     LOCKIN_INPUT_OVERLOAD = 1 << 0,
     LOCKIN_FILTER_OVERLOAD = 1 << 1,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The RS-232 language of an SRS SR830 (instruments.md 1) in front of the world's lock-in. Several
-// ports may lead to the same instrument. Thread: one.
+// The RS-232 language of an SRS SR830 in front of the world's lock-in. Several ports may lead to
+// the same instrument. Thread: one. Source: the SR830 manual, page 5-2 ff. (the rule of OUTX also
+// in that of the SR850, page 6-3); replies of a real one in pyvisa issue 638; settings as in
+// pymeasure/pymeasure:pymeasure/instruments/srs/sr830.py. Unverified: that OUTX 0 is RS-232.
 //
 // Lines end with CR or LF, commands are joined by ';', each answer ends with its own CR. Answers go
 // to the interface that OUTX chose, which at power-up is GPIB (1): without OUTX 0 nothing is heard.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Reads the tables of tests/golden (and of ../shared/real): '#' lines, a header row, numbers; what
-// is not a number becomes NAN. Included by one test program each; run from the repository's root.
+// Reads the tables of tests/golden, and measured BRDFs beside the checkout (../shared/real, when
+// there): '#' lines, a header row, numbers; what is not a number becomes NAN. Included by one test
+// program each; run from the repository's root.
 #pragma once
 #include <math.h>
 #include <stdbool.h>

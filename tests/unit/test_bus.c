@@ -372,8 +372,10 @@ static void a_descriptor_too_large_for_select_is_refused(void **state)
     limit = before;
     if (limit.rlim_cur < 1100)
         limit.rlim_cur = limit.rlim_max < 1100 ? limit.rlim_max : 1100;
-    if (limit.rlim_cur < 1100 || setrlimit(RLIMIT_NOFILE, &limit))
+    if (limit.rlim_cur < 1100 || setrlimit(RLIMIT_NOFILE, &limit)) {
+        print_message("1100 descriptors are not allowed here\n");
         skip();
+    }
     struct clk *clk = vline_begin(&slave.m.port);
     int spare = dup(0), top = spare;
     while (top < 1024)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // uses: campaign fit model base
+// One test reads measured BRDFs beside the checkout, ../shared/real, when there; else it is skipped.
 #include "campaign_fixture.h"
 
 #include "base/units.h"
@@ -380,8 +381,10 @@ static void measured_paints_are_read(void **state)
     (void)state;
     const struct dataset_filter all = dataset_filter_all();
     struct dataset d;
-    if (access("../shared/real/krylon_blue_inplane.csv", R_OK))
+    if (access("../shared/real/krylon_blue_inplane.csv", R_OK)) {
+        print_message("../shared/real: no measured BRDFs beside the checkout\n");
         skip();
+    }
     assert_int_equal(
         dataset_from_csv("../shared/real/krylon_blue_inplane.csv", "f_700nm", &all, &d, NULL), 0);
     assert_int_equal(d.count, 125);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // uses: fit model
+// One test fits measured BRDFs beside the checkout, ../shared/real, when there; else it is skipped.
 #include "fit/fit.h"
 #include "tests/unit/readings.h"
 
@@ -119,8 +120,10 @@ static void measured_paints_reach_the_best_known_delta(void **state)
         struct readings r = {.count = 0};
         struct fit_result f;
         snprintf(path, sizeof path, "../shared/real/%s_inplane.csv", paints[i].file);
-        if (!readings_load(&r, path, paints[i].column, 60))
+        if (!readings_load(&r, path, paints[i].column, 60)) {
+            print_message("%s: no measured BRDFs beside the checkout\n", path);
             skip();
+        }
         struct fit_options o = fit_options_default();
         assert_int_equal(run(&r, &o, &f), 0);
         if (f.delta > paints[i].delta)

@@ -313,7 +313,7 @@ static void a_reading_after_a_change_of_light_lags_by_the_filter(void **state)
     r->t_ns += MS(100);
     double x = atof(lockin(r, "OUTP? 1\r")); // 1 - 2/e after one time constant
     assert_true(fabs(x / 0.5 - (1 - 2 * exp(-1))) < 1e-4);
-    r->t_ns += MS(1081); // 11.8 in all: 1e-4 (instruments.md 1)
+    r->t_ns += MS(1081); // 11.8 in all: (1 + t) e^-t = 1e-4
     x = atof(lockin(r, "OUTP? 1\r"));
     assert_true(fabs(1 - x / 0.5 - 1e-4) < 4e-5);
     free(r);

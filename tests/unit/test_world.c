@@ -299,7 +299,8 @@ static void a_term_that_is_off_adds_nothing(void **state)
 
 // --- lock-in -------------------------------------------------------------------------------------
 
-// Times in time constants until the residual of a step is 1e-2 .. 1e-6, to 0.05 (instruments.md 1).
+// Times t in time constants until the residual of a step, e^-t (1 + t + ... + t^(n-1)/(n-1)!) after
+// n equal RC poles, is 1e-2 .. 1e-6, to 0.05.
 static const double settle_tc[4][5] = {{4.6, 6.9, 9.2, 11.5, 13.8},
                                        {6.6, 9.2, 11.8, 14.2, 16.7},
                                        {8.4, 11.2, 13.9, 16.6, 19.1},
