@@ -31,14 +31,15 @@ static const char *kind(const struct cfg_row *row)
 static void range(FILE *out, const struct cfg_row *row)
 {
     bool number = row->type == CFG_INT || row->type == CFG_REAL || row->type == CFG_REALS;
+    int digits = row->type == CFG_INT ? 17 : 9; // whole numbers to the last digit
     if (!number || row->min == row->max)
         return;
     if (isinf(row->max))
-        fprintf(out, ", at least %.9g", row->min);
+        fprintf(out, ", at least %.*g", digits, row->min);
     else if (isinf(row->min))
-        fprintf(out, ", at most %.9g", row->max);
+        fprintf(out, ", at most %.*g", digits, row->max);
     else
-        fprintf(out, ", %.9g to %.9g", row->min, row->max);
+        fprintf(out, ", %.*g to %.*g", digits, row->min, digits, row->max);
 }
 
 static void presence(FILE *out, const struct cfg_row *row)

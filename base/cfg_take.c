@@ -62,12 +62,13 @@ static bool limited(const struct cfg_row *row)
 static void allowed(const struct cfg_row *row, char *text, size_t size)
 {
     const char *unit = row->unit ? row->unit : "", *space = row->unit ? " " : "";
+    int digits = row->type == CFG_INT ? 17 : 9; // whole numbers to the last digit
     if (isinf(row->max))
-        snprintf(text, size, "at least %.9g%s%s", row->min, space, unit);
+        snprintf(text, size, "at least %.*g%s%s", digits, row->min, space, unit);
     else if (isinf(row->min))
-        snprintf(text, size, "at most %.9g%s%s", row->max, space, unit);
+        snprintf(text, size, "at most %.*g%s%s", digits, row->max, space, unit);
     else
-        snprintf(text, size, "%.9g..%.9g%s%s", row->min, row->max, space, unit);
+        snprintf(text, size, "%.*g..%.*g%s%s", digits, row->min, digits, row->max, space, unit);
 }
 
 static int take_number(const struct place *at, const config_setting_t *s, const struct cfg_row *row,

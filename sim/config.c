@@ -136,8 +136,10 @@ static int set_number(const struct cfg_row *row, const char *path, const char *v
 {
     double v;
     char allowed[80];
-    snprintf(allowed, sizeof allowed, "%s%g..%g%s%s", row->type == CFG_INT ? "whole numbers " : "",
-             row->min, row->max, row->unit ? " " : "", row->unit ? row->unit : "");
+    bool whole = row->type == CFG_INT;
+    int digits = whole ? 17 : 9;
+    snprintf(allowed, sizeof allowed, "%s%.*g..%.*g%s%s", whole ? "whole numbers " : "", digits,
+             row->min, digits, row->max, row->unit ? " " : "", row->unit ? row->unit : "");
     if (options_real(value, &v) || !(v >= row->min && v <= row->max))
         return wrong(path, value, allowed, err);
     if (row->type == CFG_REAL)

@@ -324,6 +324,27 @@ static void the_table_describes_itself(void **state)
     free(text);
 }
 
+static void whole_numbers_are_written_out(void **state)
+{
+    (void)state;
+    static const struct cfg_row seeds[] = {
+        {"seed", CFG_INT, .min = 0, .max = 2147483647, .fallback = "1"}, {0}};
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    cfg_describe(out, seeds);
+    fclose(out);
+    assert_string_equal(text, "*seed*: whole number, 0 to 2147483647, default 1\n\t\n\n");
+    free(text);
+
+    struct heard h = {0};
+    int seed = 7;
+    struct cfg_file *f = cfg_parse("seed = -1;\n", "c.cfg", (struct cfg_sink){hear, &h});
+    assert_int_equal(cfg_take(f, seeds, &seed), 1);
+    cfg_close(f);
+    assert_string_equal(h.text, "c.cfg:1: seed = -1: out of range; allowed 0..2147483647\n");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -339,6 +360,7 @@ int main(void)
         cmocka_unit_test(a_file_is_read_whole_and_kept),
         cmocka_unit_test(others_can_complain_too),
         cmocka_unit_test(the_table_describes_itself),
+        cmocka_unit_test(whole_numbers_are_written_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -102,6 +102,7 @@ static void wrong_settings_say_what_is_allowed(void **state)
     static const struct {
         const char *name, *value, *expected;
     } wrong[] = {{"sample.sigma", "0", "allowed 0.001..1"},
+                 {"seed", "-1", "allowed whole numbers 0..2147483647"},
                  {"sample.sigma", "nan", "allowed 0.001..1"},
                  {"sample.sigma", "0.1x", "allowed 0.001..1"},
                  {"laser.warmup_s", "-1", "allowed 0.01..3600 s"},
