@@ -27,7 +27,7 @@ static const struct option_row rows[] = {
 struct sweep {
     double theta_i_deg;
     int points, dense, skipped;
-    const char *why; // of the first skipped point
+    int skipped_for[PLAN_SKIP_LIMITS + 1]; // by enum plan_skip_reason
 };
 
 static void duration_text(double s, char *text, size_t size)
@@ -54,10 +54,22 @@ static struct sweep sweep_of(const struct plan *p, const struct campaign_config 
         }
     for (int i = 0; i < p->skips_count; i++)
         if (p->skips[i].sweep == sweep) {
-            s.why = s.why ? s.why : plan_skip_text(p->skips[i].reason);
+            s.skipped_for[p->skips[i].reason]++;
             s.skipped++;
         }
     return s;
+}
+
+// "4 in the detector's shadow, 11 beyond an axis's limits"
+static void why_text(const struct sweep *s, char *text, size_t size)
+{
+    *text = 0;
+    for (int reason = PLAN_SKIP_BLIND; reason <= PLAN_SKIP_LIMITS; reason++) {
+        size_t used = strlen(text);
+        if (s->skipped_for[reason])
+            snprintf(text + used, size - used, "%s%d %s", used ? ", " : "", s->skipped_for[reason],
+                     plan_skip_text((enum plan_skip_reason)reason));
+    }
 }
 
 static void print_plan(const struct plan *p, const struct campaign_config *c, const char *path)
@@ -80,13 +92,15 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
             table_right(t, i);
     }
     for (int i = 1; i <= p->sweeps; i++) {
+        char why[120];
         struct sweep s = sweep_of(p, c, i);
+        why_text(&s, why, sizeof why);
         table_cell(t, "%d", i);
         table_cell(t, "%g%s", s.theta_i_deg, terminal ? "°" : "");
         table_cell(t, "%d", s.points);
         table_cell(t, "%d", s.dense);
         table_cell(t, "%d", s.skipped);
-        table_cell(t, "%s", s.why ? s.why : "");
+        table_cell(t, "%s", why);
     }
     table_print(t, stdout);
     fflush(stdout);
@@ -180,8 +194,7 @@ static int run_plan(const struct verb *verb, int argc, char **argv)
 const struct verb verb_plan = {"plan",
                                "CAMPAIGN.cfg",
                                "the dry run: points, order, time, warnings; moves nothing",
-                               "Prints every sweep with its points, what is skipped and why, "
-                               "warnings, and with --bench the time it\n"
-                               "takes and the points beyond the axes' limits.\n",
+                               "Prints every sweep with its points, what is skipped and why, warnings, and\n"
+                               "with --bench the time it takes and the points beyond the axes' limits.\n",
                                rows,
                                run_plan};
