@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// check: validates a campaign, bench or simulator file and prints their tables of settings.
+// check: validates a campaign or bench file and prints their tables of settings.
 #include "cli/check.h"
 
 #include "campaign/bench.h"
@@ -46,9 +46,62 @@ static void say_count(int count, const char *what)
     fprintf(stderr, "%d %s, %s\n", count, count == 1 ? "error" : "errors", what);
 }
 
+// --- what kind of file it is --------------------------------------------------------------------
+
+// Whether a line begins with "name: {" or "name = {".
+static bool has_group(const char *text, const char *name)
+{
+    size_t n = strlen(name);
+    for (const char *at = text; (at = strstr(at, name)); at += n) {
+        const char *line = at;
+        while (line > text && (line[-1] == ' ' || line[-1] == '\t'))
+            line--;
+        const char *rest = at + n + strspn(at + n, " \t\r\n");
+        if ((line == text || line[-1] == '\n') && (*rest == ':' || *rest == '=') &&
+            rest[1 + strspn(rest + 1, " \t\r\n")] == '{')
+            return true;
+    }
+    return false;
+}
+
+static void quiet(void *ctx, const char *line)
+{
+    (void)ctx;
+    (void)line;
+}
+
+// "campaign", "bench" or "simulator", by a group that only files of that kind have; NULL: not seen.
+static const char *kind_of(const char *path)
+{
+    static const char *const signs[][2] = {{"campaign", "campaign"}, {"bench", "bench"},
+                                           {"sample", "simulator"},  {"optics", "simulator"},
+                                           {"wires", "simulator"}};
+    struct cfg_file *f = cfg_open(path, (struct cfg_sink){quiet, NULL});
+    const char *text = f ? cfg_text(f) : "", *kind = NULL;
+    for (size_t i = 0; i < sizeof signs / sizeof *signs && !kind; i++)
+        kind = has_group(text, signs[i][0]) ? signs[i][1] : NULL;
+    cfg_close(f);
+    return kind;
+}
+
+// EXIT_INPUT when it is seen to be a file of another kind, and says for whom it is.
+static int check_kind(const char *path, const char *wanted)
+{
+    const char *kind = kind_of(path);
+    if (!kind || !strcmp(kind, wanted))
+        return EXIT_OK;
+    const char *whose = !strcmp(kind, "campaign") ? "gonio run FILE"
+                        : !strcmp(kind, "bench")  ? "goniod --config FILE, gonio plan --bench FILE"
+                                                  : "goniosim --run-dir DIR --config FILE";
+    out_say("%s: a %s file, not a %s file; its use: %s", path, kind, wanted, whose);
+    return EXIT_INPUT;
+}
+
 int check_campaign(const char *path, struct campaign_config *ret_config, char **ret_text)
 {
     struct complaints c = {NULL, 0};
+    if (check_kind(path, "campaign") != EXIT_OK)
+        return EXIT_INPUT;
     if (campaign_config_load(path, (struct cfg_sink){complain, &c}, ret_config, ret_text) == 0)
         return EXIT_OK;
     say_count(c.count, "nothing started.");
@@ -99,47 +152,15 @@ static int load_bench(const char *path, struct bench_config *bench, struct cfg_s
 int check_bench(const char *path, struct bench_config *ret_bench)
 {
     struct complaints c = {NULL, 0};
+    if (check_kind(path, "bench") != EXIT_OK)
+        return EXIT_INPUT;
     if (load_bench(path, ret_bench, (struct cfg_sink){complain, &c}) == 0)
         return EXIT_OK;
     say_count(c.count, "nothing started.");
     return EXIT_INPUT;
 }
 
-// --- what kind of file it is --------------------------------------------------------------------
-
-// A campaign file has a group "campaign", a bench file one "bench".
-static bool has_group(const char *text, const char *name)
-{
-    size_t n = strlen(name);
-    for (const char *at = text; (at = strstr(at, name)); at += n) {
-        const char *line = at;
-        while (line > text && (line[-1] == ' ' || line[-1] == '\t'))
-            line--;
-        const char *rest = at + n + strspn(at + n, " \t\r\n");
-        if ((line == text || line[-1] == '\n') && (*rest == ':' || *rest == '='))
-            return true;
-    }
-    return false;
-}
-
-static void quiet(void *ctx, const char *line)
-{
-    (void)ctx;
-    (void)line;
-}
-
-static const char *kind_of(const char *path)
-{
-    struct cfg_file *f = cfg_open(path, (struct cfg_sink){quiet, NULL});
-    const char *text = f ? cfg_text(f) : "";
-    const char *kind = has_group(text, "campaign") ? "campaign"
-                       : has_group(text, "bench")  ? "bench"
-                                                   : NULL;
-    if (!kind)
-        kind = strstr(path, "goniod") || strstr(path, "bench") ? "bench" : "campaign";
-    cfg_close(f);
-    return kind;
-}
+// --- the verb --------------------------------------------------------------------------------------
 
 static int print_settings(const char *kind)
 {
@@ -152,6 +173,24 @@ static int print_settings(const char *kind)
         return EXIT_INPUT;
     }
     return EXIT_OK;
+}
+
+static void print_report(const char *path, const char *kind, json_t *errors) // takes errors
+{
+    json_t *report = json_pack("{s:s, s:s, s:o}", "file", path, "kind", kind, "errors", errors);
+    out_json(report);
+    json_decref(report);
+}
+
+static int refuse_simulator(const char *path, bool json)
+{
+    static const char why[] = "a simulator file, which goniosim checks when it starts: "
+                              "goniosim --run-dir DIR --config FILE";
+    if (json)
+        print_report(path, "simulator", json_pack("[s]", why));
+    else
+        out_say("%s: %s", path, why);
+    return EXIT_INPUT;
 }
 
 static int run_check(const struct verb *verb, int argc, char **argv)
@@ -168,6 +207,10 @@ static int run_check(const struct verb *verb, int argc, char **argv)
         return EXIT_INPUT;
     }
     const char *kind = kind_of(path);
+    if (!kind)
+        kind = strstr(path, "goniod") || strstr(path, "bench") ? "bench" : "campaign";
+    else if (!strcmp(kind, "simulator"))
+        return refuse_simulator(path, o.json);
     struct complaints c = {o.json ? json_array() : NULL, 0};
     struct cfg_sink sink = {complain, &c};
     struct campaign_config *campaign = malloc(sizeof *campaign);
@@ -177,15 +220,12 @@ static int run_check(const struct verb *verb, int argc, char **argv)
                                          : load_bench(path, bench, sink);
     free(campaign);
     free(bench);
-    if (o.json) {
-        json_t *report = json_pack("{s:s, s:s, s:o}", "file", path, "kind", kind, "errors", c.list);
-        out_json(report);
-        json_decref(report);
-    } else if (rc < 0) {
+    if (o.json)
+        print_report(path, kind, c.list);
+    else if (rc < 0)
         say_count(c.count, "mend them and check again.");
-    } else {
+    else
         fprintf(stderr, "%s: a good %s file\n", path, kind);
-    }
     return rc < 0 ? EXIT_INPUT : EXIT_OK;
 }
 
@@ -193,8 +233,9 @@ const struct verb verb_check = {
     "check",
     "FILE.cfg",
     "validate a campaign or bench file, nothing else",
-    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen "
-    "from its\n"
-    "groups. A campaign's meaning, with its estimated time: gonio plan FILE.cfg\n",
+    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen\n"
+    "from its groups. A campaign's meaning, with its estimated time: gonio plan FILE.cfg. A file of\n"
+    "the simulator is checked by goniosim itself, when it starts: goniosim --run-dir DIR --config\n"
+    "FILE.cfg says what is wrong with it and ends with status 2.\n",
     rows,
     run_check};

@@ -75,6 +75,24 @@ def test_plan_is_a_table_in_a_pipe():
     assert "\033" not in r.stdout + r.stderr
 
 
+def test_plan_counts_what_is_skipped_by_reason(tmp_path):
+    bench = (ROOT / "configs" / "goniod.cfg").read_text()
+    assert bench.count("min = -90.0") == 1
+    narrow = write(tmp_path / "goniod.cfg", bench.replace("min = -90.0", "min = -60.0"))
+    text = (ROOT / "configs" / "paper.cfg").read_text().replace("readings:", "blind_half_deg = 4; readings:")
+    args = ["plan", write(tmp_path / "shadow.cfg", text), "--bench", narrow]
+    plan = json.loads(gonio(*args, "--json").stdout)
+    rows = [line.split("\t") for line in gonio(*args).stdout.splitlines()[1:]]
+    mixed = 0
+    for row, sweep in zip(rows, plan["sweeps"], strict=True):
+        reasons = [s["reason"] for s in plan["skipped"] if s["sweep"] == sweep["sweep"]]
+        counts = {r: reasons.count(r) for r in ("in the detector's shadow", "beyond an axis's limits")}
+        assert row[4] == f"{len(reasons)}" and sum(counts.values()) == len(reasons) == sweep["skipped"]
+        assert row[5] == ", ".join(f"{n} {r}" for r, n in counts.items() if n), row
+        mixed += all(counts.values())
+    assert mixed
+
+
 BAD = """\
 campaign: {
   name = "bad";
@@ -116,6 +134,20 @@ def test_check_knows_campaign_and_bench(tmp_path):
         r = gonio("check", "--settings", kind)
         assert r.returncode == 0 and len(r.stdout) > 500
     assert gonio("check", "--settings", "x").returncode == 2
+
+
+def test_a_file_of_another_kind_is_called_so():
+    bench, paper, sim = (ROOT / "configs" / f"{name}.cfg" for name in ("goniod", "paper", "sim"))
+    for args, says in ((["run", bench], "a bench file, not a campaign file; its use: goniod --config"),
+                       (["plan", bench], "a bench file, not a campaign file"),
+                       (["plan", paper, "--bench", paper], "a campaign file, not a bench file; its use: gonio run"),
+                       (["run", sim], "a simulator file, not a campaign file; its use: goniosim"),
+                       (["check", sim], "a simulator file, which goniosim checks when it starts")):
+        r = gonio(*args)
+        assert r.returncode == 2 and says in r.stderr and len(r.stderr.splitlines()) == 1, r.stderr
+    r = gonio("check", ROOT / "configs" / "sim-glossy.cfg", "--json")
+    report = json.loads(r.stdout)
+    assert r.returncode == 2 and report["kind"] == "simulator" and len(report["errors"]) == 1
 
 
 def test_check_reads_the_links(tmp_path):
