@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LONGEST_WORD = 40, MOST_ROWS = 40 };
+enum { LONGEST_WORD = 40, MOST_ROWS = 40, WIDEST_LINE = 79 };
 
 static int min3(int a, int b, int c)
 {
@@ -167,13 +167,28 @@ int options_take(int argc, char **argv, const struct option_row *rows, void *tar
     return count;
 }
 
+void options_fill(FILE *out, const char *text, int column)
+{
+    int at = column;
+    for (text += strspn(text, " \n"); *text; text += strspn(text, " \n")) {
+        int length = (int)strcspn(text, " \n");
+        if (at > column && at + 1 + length > WIDEST_LINE)
+            at = fprintf(out, "\n%*s", column, "") - 1;
+        else if (at > column)
+            at += fprintf(out, " ");
+        at += fprintf(out, "%.*s", length, text);
+        text += length;
+    }
+    fputc('\n', out);
+}
+
 void options_describe(FILE *out, const struct option_row *rows)
 {
     for (; rows->name; rows++) {
         char left[64];
         snprintf(left, sizeof left, "%s%s%s", rows->name, rows->value ? " " : "",
                  rows->value ? rows->value : "");
-        fprintf(out, "  %-26s %s\n", left, rows->help);
+        options_fill(out, rows->help, fprintf(out, "  %-26s ", left));
     }
 }
 

@@ -29,9 +29,10 @@ struct option_row {
 int options_take(int argc, char **argv, const struct option_row *rows, void *target,
                  const char **operands, int most, struct gon_error *err);
 
-void options_describe(FILE *out, const struct option_row *rows); // one line an option, for --help
-
+void options_describe(FILE *out, const struct option_row *rows); // for --help
 void options_manual(FILE *out, const struct option_row *rows);   // the same as scdoc text
+// Words in lines of at most 79 columns, from a column that out has reached; ends the last line.
+void options_fill(FILE *out, const char *text, int column);
 
 // Which of the words (NULL at their end) may have been meant by a mistyped one; NULL when none is
 // near.

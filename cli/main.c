@@ -22,14 +22,16 @@ static void print_verbs(FILE *out)
     fprintf(
         out,
         "\ngonio help VERB tells more; gonio --version; the daemon: goniod --help\n"
-        "Exit status: 0 done, 1 the instrument or the fit failed, 2 wrong arguments or file, 3 no\n"
-        "daemon, 4 refused, 130 interrupted.\n");
+        "Exit status: 0 done, 1 the instrument or the fit failed, 2 wrong arguments or\n"
+        "file, 3 no daemon, 4 refused, 130 interrupted.\n");
 }
 
 static void print_verb(const struct verb *v, FILE *out)
 {
-    fprintf(out, "usage: gonio %s%s%s%s\n\n%s\n", v->name, v->options->name ? " [OPTIONS]" : "",
-            *v->operands ? " " : "", v->operands, v->about);
+    fprintf(out, "usage: gonio %s%s%s%s\n\n", v->name, v->options->name ? " [OPTIONS]" : "",
+            *v->operands ? " " : "", v->operands);
+    options_fill(out, v->about, 0);
+    fputc('\n', out);
     options_describe(out, v->options);
 }
 

@@ -17,7 +17,7 @@ struct verb {
     const char *name;
     const char *operands; // "FILE.cfg"
     const char *summary;  // a few words for the list of verbs
-    const char *about;    // paragraphs for `gonio help VERB`, each line ended
+    const char *about;    // a paragraph for `gonio help VERB`, which fills the lines
     const struct option_row *options;
     // argv[0] is the verb; returns exit_status.
     int (*run)(const struct verb *verb, int argc, char **argv);

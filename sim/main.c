@@ -114,9 +114,8 @@ static int serve(struct arguments *a)
 static bool describe(const struct arguments *a)
 {
     if (a->help)
-        printf(
-            "goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and a control "
-            "socket\n");
+        printf("goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and a\n"
+               "control socket\n");
     if (a->help)
         options_describe(stdout, rows);
     else if (a->version)

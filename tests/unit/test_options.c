@@ -9,6 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 struct target {
@@ -97,6 +98,24 @@ static void suggestions_are_near_or_absent(void **state)
     assert_null(options_suggest("frobnicate", words));
 }
 
+static void words_fill_lines_of_79_columns(void **state)
+{
+    (void)state;
+    char words[400] = "", *text = NULL, *line, *rest;
+    size_t size = 0;
+    int lines = 0;
+    for (int i = 0; i < 60; i++)
+        strcat(words, i % 7 ? "four " : "four\n");
+    FILE *out = open_memstream(&text, &size);
+    options_fill(out, words, 20);
+    fclose(out);
+    assert_int_equal(size, 60 * 5 + 4 * 20); // twelve words are 59 columns: five lines
+    for (rest = text; (line = strsep(&rest, "\n")) && *line; lines++)
+        assert_int_equal(strlen(line), lines ? 20 + 12 * 5 - 1 : 12 * 5 - 1);
+    assert_int_equal(lines, 5);
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -104,6 +123,7 @@ int main(void)
         cmocka_unit_test(defaults_stay_and_two_dashes_end_the_options),
         cmocka_unit_test(mistakes_say_what_was_meant),
         cmocka_unit_test(suggestions_are_near_or_absent),
+        cmocka_unit_test(words_fill_lines_of_79_columns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
