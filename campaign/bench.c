@@ -124,7 +124,7 @@ static const struct cfg_row station_rows[] = {
 
 static const struct cfg_row daemon_rows[] = {
     TEXT(bench_config, "directory", directory, "",
-         "Where campaign files go; gonio(1) says where otherwise."),
+         "Where campaign files go; goniod(8), FILES, says what goes before it and where otherwise."),
     {0}};
 
 #define MANY(n, member, most, element, table, text)                                                \
