@@ -156,7 +156,7 @@ def test_check_reads_the_links(tmp_path):
     r = gonio("check", write(tmp_path / "b.cfg", changed))
     lines = r.stderr.splitlines()
     assert r.returncode == 2 and len(lines) == 4, r.stderr
-    for line, number, wrong in ((lines[0], 27, "baud=-1"), (lines[1], 13, "parity=X"), (lines[2], 33, "baut=1")):
+    for line, number, wrong in ((lines[0], 36, "baud=-1"), (lines[1], 16, "parity=X"), (lines[2], 44, "baut=1")):
         assert f"b.cfg:{number}:" in line and f"'{wrong}'" in line, line
     assert gonio("check", write(tmp_path / "b.cfg", text)).returncode == 0
 
