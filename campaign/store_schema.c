@@ -13,6 +13,7 @@
 // clang-format off
 #define PARAMETER(p) p " REAL, u_" p " REAL, " p "_lo95 REAL, " p "_hi95 REAL, " \
                      p "_identified INTEGER, " p "_at_bound INTEGER, "
+#define RESULT(p) p ", u_" p ", " p "_lo95, " p "_hi95, " p "_identified, " p "_at_bound, "
 #define DERIVED(p) p " REAL, u_" p " REAL, "
 #define NEVER(what, table, text) \
     "CREATE TRIGGER " table "_" what " BEFORE " what " ON " table \
@@ -72,9 +73,7 @@ const char store_schema_sql[] =
     " WHERE p.kind = 'sample';"
 
     "CREATE VIEW fit_result AS SELECT id, t_utc_ms, sweep, method, weights, diffuse, seed, points,"
-    " delta, n, u_n, n_lo95, n_hi95, n_identified, k, u_k, k_lo95, k_hi95, k_identified,"
-    " sigma, u_sigma, sigma_lo95, sigma_hi95, sigma_identified,"
-    " ks, u_ks, ks_lo95, ks_hi95, ks_identified, kd, u_kd, kd_lo95, kd_hi95, kd_identified,"
+    " delta, " RESULT("n") RESULT("k") RESULT("sigma") RESULT("ks") RESULT("kd")
     " ks_r0, u_ks_r0, ks_r45, u_ks_r45, dhr_0, u_dhr_0, dhr_45, u_dhr_45, dhr_60, u_dhr_60,"
     " chi2_per_dof, warnings, elapsed_ms FROM fit;";
 // clang-format on

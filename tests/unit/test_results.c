@@ -140,6 +140,9 @@ static void results_are_columns_and_views(void **state)
     assert_true(query("SELECT sigma FROM fit_result") == fit.result.params.sigma);
     assert_true(query("SELECT u_kd FROM fit_result") == fit.result.estimate[FIT_KD].u);
     assert_true(query("SELECT n_hi95 FROM fit_result") == fit.result.estimate[FIT_N].hi95);
+    assert_true(query("SELECT sigma_identified FROM fit_result") == 1);
+    assert_true(query("SELECT sigma_at_bound FROM fit_result") == 0);
+    assert_true(query("SELECT k_at_bound FROM fit_result") == fit.result.estimate[FIT_K].at_bound);
     assert_true(query("SELECT ks_r45 FROM fit_result") == fit.result.ks_r45.value);
     assert_true(query("SELECT u_dhr_60 FROM fit_result") == fit.result.dhr_60.u);
     assert_int_equal(query("SELECT warnings FROM fit_result"), fit.result.warnings);
