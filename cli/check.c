@@ -160,7 +160,7 @@ int check_bench(const char *path, struct bench_config *ret_bench)
     return EXIT_INPUT;
 }
 
-// --- the verb --------------------------------------------------------------------------------------
+// --- the verb -----------------------------------------------------------------------------------
 
 static int print_settings(const char *kind)
 {
@@ -233,9 +233,9 @@ const struct verb verb_check = {
     "check",
     "FILE.cfg",
     "validate a campaign or bench file, nothing else",
-    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen\n"
-    "from its groups. A campaign's meaning, with its estimated time: gonio plan FILE.cfg. A file of\n"
-    "the simulator is checked by goniosim itself, when it starts: goniosim --run-dir DIR --config\n"
-    "FILE.cfg says what is wrong with it and ends with status 2.\n",
+    "Reports every mistake with file and line. Whether it is a campaign or a bench file is seen "
+    "from its groups. A campaign's meaning, with its estimated time: gonio plan FILE.cfg. A file "
+    "of the simulator is checked by goniosim itself when it starts: goniosim --run-dir DIR "
+    "--config FILE.cfg says what is wrong with it and ends with status 2.\n",
     rows,
     run_check};

@@ -194,7 +194,8 @@ static int run_plan(const struct verb *verb, int argc, char **argv)
 const struct verb verb_plan = {"plan",
                                "CAMPAIGN.cfg",
                                "the dry run: points, order, time, warnings; moves nothing",
-                               "Prints every sweep with its points, what is skipped and why, warnings, and\n"
-                               "with --bench the time it takes and the points beyond the axes' limits.\n",
+                               "Prints every sweep with its points, what is skipped and why, "
+                               "warnings, and with --bench the time it\n"
+                               "takes and the points beyond the axes' limits.\n",
                                rows,
                                run_plan};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // uses: campaign fit model base
-// One test reads measured BRDFs beside the checkout, ../shared/real, when there; else it is skipped.
+// One test reads measured BRDFs beside the checkout, ../shared/real, when there; else skipped.
 #include "campaign_fixture.h"
 
 #include "base/units.h"

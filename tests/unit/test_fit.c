@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // uses: fit model
-// One test fits measured BRDFs beside the checkout, ../shared/real, when there; else it is skipped.
+// One test fits measured BRDFs beside the checkout, ../shared/real, when there; else skipped.
 #include "fit/fit.h"
 #include "tests/unit/readings.h"
 
