@@ -106,11 +106,11 @@ static void print_help(void)
 {
     printf("usage: goniod --config FILE [OPTIONS]\n       goniod --sim [--fast] [--seed N] "
            "[OPTIONS]\n\n"
-           "Runs the goniometer: owns its devices, measures queued campaigns, fits after each "
-           "sweep.\n\n");
+           "Runs the goniometer: owns its devices, measures queued campaigns, fits after\n"
+           "each sweep.\n\n");
     options_describe(stdout, rows);
-    printf("\nSIGTERM or Ctrl-C: laser off, axes stopped, everything stored, then the end. The "
-           "command: gonio help\n");
+    printf("\nSIGTERM or Ctrl-C: laser off, axes stopped, everything stored, then the end.\n"
+           "The command: gonio help\n");
 }
 
 // --- callbacks of the loop -----------------------------------------------------------------------
