@@ -201,7 +201,12 @@ static void the_json_of_a_fit_has_its_shape(void **state)
     f.result.chi2_per_dof = (double)NAN;
     f.result.warnings = FIT_WARN_FEW_SWEEPS;
     for (int i = 0; i < FIT_PARAMS; i++)
-        f.result.estimate[i] = (struct fit_estimate){1.0 / 3 + i, 0.01, 0.3, 0.4, i == 2, i == 3};
+        f.result.estimate[i] = (struct fit_estimate){.value = 1.0 / 3 + i,
+                                                      .u = 0.01,
+                                                      .lo95 = 0.3,
+                                                      .hi95 = 0.4,
+                                                      .identified = i == 2,
+                                                      .at_bound = i == 3};
     f.result.dhr_45 = (struct fit_derived){1.0 / 7, 0.001};
     f.result.correlation[1][3] = -0.9998;
     f.result.evaluations = 12345;
