@@ -165,7 +165,14 @@ def test_run_follows_when_all_streams_are_taken(daemon, stand_in, tmp_path):
 
 def has_socket(pid):
     folder = f"/proc/{pid}/fd"
-    return any(os.readlink(f"{folder}/{fd}").startswith("socket:") for fd in os.listdir(folder))
+
+    def kind(fd):
+        try:
+            return os.readlink(f"{folder}/{fd}")
+        except FileNotFoundError:  # closed meanwhile
+            return ""
+
+    return any(kind(fd).startswith("socket:") for fd in os.listdir(folder))
 
 
 @pytest.mark.parametrize("options", [[], ["--detach"]])
