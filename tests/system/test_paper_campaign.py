@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The paper's whole plan, over Modbus RTU + serial with the lines' speed enforced and over TCP, from plan to fit;
 and smaller plans with other seeds and samples. What is recovered must lie within 3 reported standard uncertainties
-of the simulated truth: 3 quantities and 5 campaigns, so a correct program fails once in 25 runs of fresh seeds; the
-seeds are fixed, so it passes or fails for good."""
+of the simulated truth. The simulator's noise comes as real time does, so a fixed seed does not fix it: of 3 quantities
+one in 120 campaigns of a correct program lies beyond 3. Such a campaign (none beyond 5) is measured once more with
+another seed and must then hold: 5 campaigns fail by chance once in 3000 runs."""
 import json
 import math
 
@@ -24,19 +25,34 @@ def fresnel_mean(n, k, beta_deg):
     return (abs((c - q) / (c + q)) ** 2 + abs((eps * c - q) / (eps * c + q)) ** 2) / 2
 
 
-def assert_recovered(fit, truth):
+def worst_deviation(fit, truth):
+    """Of sigma, kd and ks R(45), in standard uncertainties."""
     p = fit["params"]
     expected = {"sigma": (p["sigma"], truth["sigma"]), "kd": (p["kd"], truth["kd"]),
                 "ks_r45": (fit["derived"]["ks_r45"], truth["ks"] * fresnel_mean(truth["n"], truth["k"], 45))}
+    z = {}
     for name, (got, true) in expected.items():
         assert got["u"] > 0 and got["u"] < 0.05 * true, (name, got)
-        assert abs(got["value"] - true) <= 3 * got["u"], (name, got, true)
+        z[name] = (got["value"] - true) / got["u"]
+    print("standard uncertainties from the truth:", z)
+    assert max(map(abs, z.values())) <= 5, (z, p)
+    return max(map(abs, z.values()))
 
 
-def measure(start_sim, start_daemon, config, bench, *sim_args):
-    sim = start_sim(*sim_args)
+def recover(check, start_sim, start_daemon, config, bench, *sim_args, seed):
+    """Measures, lets the caller check the run, and compares with the truth; once more beyond 3."""
+    for again in (0, 1000):
+        measured = measure(start_sim, start_daemon, config, bench, *sim_args, seed=seed + again)
+        check(*measured)
+        if worst_deviation(measured[3], measured[2]) <= 3:
+            return
+    pytest.fail("two campaigns lie beyond 3 standard uncertainties")
+
+
+def measure(start_sim, start_daemon, config, bench, *sim_args, seed):
+    sim = start_sim(*sim_args, "--seed", seed, folder=config.parent / f"bench{seed}")
     truth = sim.control(do="truth")["sample"]
-    daemon = start_daemon("--config", sim.folder / bench)
+    daemon = start_daemon("--config", sim.folder / bench, folder=config.parent / f"d{seed}")
     done = daemon.gonio("run", config, "--json", patience_s=85)
     assert done.returncode == 0, (done.stderr[-2000:], daemon.errors()[-2000:])
     last = json.loads(done.stdout.splitlines()[-1])
@@ -52,12 +68,14 @@ def test_the_papers_plan_runs_to_its_end_and_recovers_the_sample(start_sim, star
                                                                  seed):
     config = tmp_path / "paper.cfg"
     config.write_text(PAPER.replace("count = 4", "count = 2"))  # the directions are the paper's; half the samples
-    daemon, run, truth, fit, _ = measure(start_sim, start_daemon, config, bench, *args, "--seed", seed)
-    assert run["state"] == "done"
-    shown = json.loads(daemon.gonio("show", run["id"], "--json").stdout)
-    assert fit["points"] == 850  # ten sweeps of 69 + 16 directions
-    assert shown["fit"]["points"] == 850  # and the daemon's own, after the last sweep
-    assert_recovered(fit, truth)
+
+    def check(daemon, run, truth, fit, last):
+        assert run["state"] == "done"
+        shown = json.loads(daemon.gonio("show", run["id"], "--json").stdout)
+        assert fit["points"] == 850  # ten sweeps of 69 + 16 directions
+        assert shown["fit"]["points"] == 850  # and the daemon's own, after the last sweep
+
+    recover(check, start_sim, start_daemon, config, bench, *args, seed=seed)
 
 
 SMALL_PLAN = """\
@@ -79,7 +97,8 @@ def test_other_seeds_and_samples_are_recovered(start_sim, start_daemon, tmp_path
     config = tmp_path / "seed.cfg"
     config.write_text(SMALL_PLAN)
     sets = [w for name, value in sample.items() for w in ("--set", f"sample.{name}={value}")]
-    _, run, truth, fit, _ = measure(start_sim, start_daemon, config, "goniod-tcp.cfg", "--fast", "--seed", seed,
-                                    *sets)
-    assert run["state"] == "done"
-    assert_recovered(fit, truth)
+
+    def check(daemon, run, truth, fit, last):
+        assert run["state"] == "done"
+
+    recover(check, start_sim, start_daemon, config, "goniod-tcp.cfg", "--fast", *sets, seed=seed)
