@@ -156,8 +156,9 @@ int engine_pause_run(struct engine *e)
         rc = wait_for_operator(e);
         e->returns = 0;
     }
+    const bool returned = by_itself && !e->wanted; // and nobody took the pause over
     e->wanted = false;
     if (rc >= 0)
-        engine_enter(e, before, by_itself ? "everything is there again; going on" : "resumed");
+        engine_enter(e, before, returned ? "everything is there again; going on" : "resumed");
     return rc;
 }
