@@ -5,7 +5,7 @@
 // bytes or registers.
 //
 // What comes is believed only when it fits its pattern, lies in its range and holds to the
-// exchange's "believe"; otherwise the link is out of step and it is asked again, up to 3 times. A
+// exchange's "believe" (as far as all values in that are known); otherwise the link is out of step and it is asked again, up to 3 times. A
 // setting is sent once; what verifies it is asked afterwards. Neighbouring Modbus reads get
 // different lengths, so that a late answer fails its length check. Thread: the instrument's.
 #pragma once
@@ -37,6 +37,9 @@ struct profile_data *session_data(struct session *s);     // to look at and to s
 void session_put(struct session *s, const char *name, double number);
 double session_number(const struct session *s, const char *name); // NAN: not known
 bool session_holds(const struct session *s, const char *condition);
+// Which values the asks bring: ret_gives[value] is set to true; others stay.
+void session_gives(const struct profile *p, const struct profile_asks *asks,
+                   bool ret_gives[PROFILE_VALUES]);
 
 // All of them, or an error: GON_E_LINK, GON_E_GONE, GON_E_DEVICE (refused; exception answer).
 int session_ask(struct session *s, const struct profile_asks *asks, struct gon_error *err);
