@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/message.h"
 
+#include "drivers/checksum.h"
+
 #include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +10,7 @@
 
 #define LINE_MOST 4096
 #define COMMAND_MOST 256
+#define CHECKSUM_MOST 16 // digits and what stands before them
 #define TRIES 3
 #define WRITE_NS CLK_MS(200) // for a command to leave
 #define DELAY_NS CLK_MS(20) // a command may reach the device so much later than we think (USB, TCP)
@@ -87,13 +90,20 @@ static int garbled(struct message *m, const char *command, const char *what, siz
 
 static int put(struct message *m, const char *command, struct gon_error *err)
 {
+    const struct message_format *f = m->format;
     char line[COMMAND_MOST];
-    int n = snprintf(line, sizeof line, "%s%s", command, m->format->end_out);
-    assert(n > 0 && (size_t)n < sizeof line);
+    size_t size = strlen(command);
+    assert(size + strlen(f->end_out) + CHECKSUM_MOST < sizeof line);
+    memcpy(line, command, size + 1);
+    int rc = f->checksum ? checksum_append(f->checksum, line, size, sizeof line, &size, err) : 0;
+    if (rc < 0)
+        return rc;
+    memcpy(line + size, f->end_out, strlen(f->end_out));
+    size += strlen(f->end_out);
     struct clk *clk = transport_clk(m->t);
-    int rc = transport_write(m->t, line, (size_t)n, clk_now_ns(clk) + WRITE_NS, err);
-    m->ready_ns = clk_now_ns(clk) + m->format->min_gap_ns; // its answer will put it right
-    if (m->format->min_gap_ns > 0)
+    rc = transport_write(m->t, line, size, clk_now_ns(clk) + WRITE_NS, err);
+    m->ready_ns = clk_now_ns(clk) + f->min_gap_ns; // its answer will put it right
+    if (f->min_gap_ns > 0)
         m->ready_ns += DELAY_NS;
     if (rc == GON_E_LINK || rc == GON_E_CANCELED) // half a command may have left
         m->out_of_step = true;
@@ -120,19 +130,24 @@ static int wait_gap(struct message *m, struct gon_error *err)
 
 // --- one question --------------------------------------------------------------------------------
 
-static char *find_end(struct message *m)
+// A part of m->in.
+struct span {
+    size_t begin, end;
+};
+
+static char *find_end(struct message *m, size_t from)
 {
     size_t length = strlen(m->format->end_in);
-    return m->have < length ? NULL : memmem(m->in, m->have, m->format->end_in, length);
+    return m->have < from + length ? NULL
+                                   : memmem(m->in + from, m->have - from, m->format->end_in, length);
 }
 
-// Fills m->in until a line is complete; its length.
-static int take_line(struct message *m, const char *command, struct gon_error *err)
+// Reads on until the line that begins at from is complete.
+static int take_line(struct message *m, const char *command, size_t from, int64_t deadline_ns,
+                     struct span *ret_line, struct gon_error *err)
 {
-    const int64_t deadline_ns = clk_now_ns(transport_clk(m->t)) + m->format->timeout_ns;
     char *end;
-    m->have = 0;
-    while (!(end = find_end(m))) {
+    while (!(end = find_end(m, from))) {
         if (m->have == sizeof m->in)
             return garbled(m, command, "4096 bytes without an end", 40, err);
         int rc = transport_read(m->t, m->in + m->have, sizeof m->in - m->have, deadline_ns, err);
@@ -152,7 +167,80 @@ static int take_line(struct message *m, const char *command, struct gon_error *e
         m->have += (size_t)rc;
     }
     m->ready_ns = clk_now_ns(transport_clk(m->t)) + m->format->min_gap_ns;
-    return (int)(end - m->in);
+    *ret_line = (struct span){from, (size_t)(end - m->in)};
+    return 0;
+}
+
+static void trim_begin(const struct message *m, struct span *s)
+{
+    while (s->begin < s->end && m->in[s->begin] && strchr(" \t\r\n", m->in[s->begin]))
+        s->begin++;
+}
+
+static void trim_end(const struct message *m, struct span *s)
+{
+    while (s->end > s->begin && m->in[s->end - 1] && strchr(" \t", m->in[s->end - 1]))
+        s->end--;
+}
+
+static bool is_text(const struct message *m, const struct span *s, const char *text)
+{
+    return s->end - s->begin == strlen(text) && memcmp(m->in + s->begin, text, strlen(text)) == 0;
+}
+
+static bool given(const char *text)
+{
+    return text && *text;
+}
+
+static bool stands_alone(const struct message *m, const struct span *s)
+{
+    char line[COMMAND_MOST];
+    if (!m->format->alone || s->end - s->begin >= sizeof line)
+        return false;
+    memcpy(line, m->in + s->begin, s->end - s->begin);
+    line[s->end - s->begin] = 0;
+    return m->format->alone(m->format->ctx, line);
+}
+
+// The line that says OK: instead of an answer, or behind it.
+static int take_ok(struct message *m, const char *command, int64_t deadline_ns,
+                   struct span *answer, size_t *ret_used, struct gon_error *err)
+{
+    const size_t end_size = strlen(m->format->end_in);
+    struct span line = *answer;
+    trim_begin(m, &line);
+    trim_end(m, &line);
+    if (is_text(m, &line, m->format->ok_line)) {
+        answer->begin = answer->end;
+        return 0;
+    }
+    if (stands_alone(m, &line))
+        return 0;
+    int rc = take_line(m, command, answer->end + end_size, deadline_ns, &line, err);
+    if (rc < 0)
+        return rc;
+    *ret_used = line.end + end_size;
+    trim_begin(m, &line);
+    trim_end(m, &line);
+    return is_text(m, &line, m->format->ok_line)
+               ? 0
+               : garbled(m, command, "a second line that does not say OK", m->have, err);
+}
+
+// Behind the command as the device repeats it; the answer may be missing.
+static int cut_echo(struct message *m, const char *command, struct span *answer,
+                    struct gon_error *err)
+{
+    const size_t length = strlen(command), end_size = strlen(m->format->echo_end);
+    const char *text = m->in + answer->begin;
+    const size_t size = answer->end - answer->begin;
+    if (size < length || memcmp(text, command, length) != 0 ||
+        (size > length && (size < length + end_size ||
+                           memcmp(text + length, m->format->echo_end, end_size) != 0)))
+        return garbled(m, command, "the device does not repeat the command", answer->end, err);
+    answer->begin += size > length ? length + end_size : length;
+    return 0;
 }
 
 static bool is_printable(const char *bytes, size_t size)
@@ -163,34 +251,61 @@ static bool is_printable(const char *bytes, size_t size)
     return true;
 }
 
-// The line as an answer: one line and no more, readable, not empty, not the command itself.
+static int unwanted_echo(struct message *m, const char *command, struct gon_error *err)
+{
+    m->out_of_step = true; // the real answer follows
+    return gon_fail(err, GON_E_DEVICE, "%s: sends back the command '%s'; turn its echo off",
+                    transport_link(m->t), command);
+}
+
+// Cuts off what is not the answer itself.
+static int unwrap(struct message *m, const char *command, struct span *a, struct gon_error *err)
+{
+    const struct message_format *f = m->format;
+    trim_begin(m, a);
+    int rc = given(f->echo_end) ? cut_echo(m, command, a, err) : 0;
+    if (rc == 0 && f->checksum && a->end > a->begin) {
+        size_t size;
+        struct gon_error why;
+        if (checksum_take(f->checksum, m->in + a->begin, a->end - a->begin, &size, &why) < 0)
+            return garbled(m, command, why.text, a->end, err);
+        a->end = a->begin + size;
+    }
+    if (rc == 0)
+        trim_begin(m, a);
+    trim_end(m, a);
+    return rc;
+}
+
+// The answer: one and no more, readable, not the command itself, and not empty where that could not
+// be told from a stray terminator.
 static int take_answer(struct message *m, const char *command, char *ret_answer, size_t size,
                        struct gon_error *err)
 {
-    int n = take_line(m, command, err);
-    if (n < 0)
-        return n;
-    size_t begin = 0, end = (size_t)n;
-    const bool more = m->have > end + strlen(m->format->end_in);
-    while (begin < end && strchr(" \t\r\n", m->in[begin]) && m->in[begin])
-        begin++;
-    while (end > begin && strchr(" \t", m->in[end - 1]) && m->in[end - 1])
-        end--;
-    if (end - begin == strlen(command) && memcmp(m->in + begin, command, end - begin) == 0) {
-        m->out_of_step = true; // the real answer follows
-        return gon_fail(err, GON_E_DEVICE, "%s: sends back the command '%s'; turn its echo off",
-                        transport_link(m->t), command);
-    }
-    if (more)
+    const struct message_format *f = m->format;
+    const int64_t deadline_ns = clk_now_ns(transport_clk(m->t)) + f->timeout_ns;
+    struct span a;
+    m->have = 0;
+    int rc = take_line(m, command, 0, deadline_ns, &a, err);
+    size_t used = rc < 0 ? 0 : a.end + strlen(f->end_in);
+    if (rc == 0 && given(f->ok_line))
+        rc = take_ok(m, command, deadline_ns, &a, &used, err);
+    if (rc == 0)
+        rc = unwrap(m, command, &a, err);
+    if (rc < 0)
+        return rc;
+    if (!given(f->echo_end) && is_text(m, &a, command))
+        return unwanted_echo(m, command, err);
+    if (m->have > used)
         return garbled(m, command, "two answers to one question", m->have, err);
-    if (begin == end)
-        return garbled(m, command, "an empty answer", end, err);
-    if (!is_printable(m->in + begin, end - begin))
-        return garbled(m, command, "unreadable bytes in the answer (wrong baud rate?)", end, err);
-    if (end - begin >= size)
-        return garbled(m, command, "the answer is too long", end, err);
-    memcpy(ret_answer, m->in + begin, end - begin);
-    ret_answer[end - begin] = 0;
+    if (a.begin == a.end && !given(f->echo_end) && !given(f->ok_line))
+        return garbled(m, command, "an empty answer", a.end, err);
+    if (!is_printable(m->in + a.begin, a.end - a.begin))
+        return garbled(m, command, "unreadable bytes in the answer (wrong baud rate?)", a.end, err);
+    if (a.end - a.begin >= size)
+        return garbled(m, command, "the answer is too long", a.end, err);
+    memcpy(ret_answer, m->in + a.begin, a.end - a.begin);
+    ret_answer[a.end - a.begin] = 0;
     return 0;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Question and answer in lines of text over a transport: terminators, echo, minimum gap between
-// commands, reassembly of partial lines, a cap on their length (4 KiB), and resynchronisation.
+// Question and answer in lines of text over a transport: terminators, echo, a line that says OK,
+// checksums, minimum gap between commands, reassembly of partial lines, a cap on their length
+// (4 KiB), and resynchronisation.
 //
 // After any timeout or unreadable answer the link is out of step: a late answer would be taken for
 // the next one's. So the next query first drains until quiet_ns of silence and asks a question
@@ -14,6 +15,7 @@
 #include <stdbool.h>
 
 struct message;
+struct profile_checksum;
 
 struct message_format {
     const char *end_out;    // appended to what is sent: "\r"
@@ -23,6 +25,12 @@ struct message_format {
     int64_t quiet_ns;       // silence after which nothing more comes: the largest latency
     const char *sync_query; // asked to get into step, with an answer of
     const char *sync_begins; // this beginning; NULL query: draining is all
+    const char *echo_end;    // the device repeats the command, then this, then the answer: is
+                             // checked and cut off. NULL or "": it must not repeat anything
+    const char *ok_line;     // follows each answer as a line of its own; NULL or "": none
+    bool (*alone)(const void *ctx, const char *line); // a line (error) without an ok_line; or NULL
+    const void *ctx;
+    const struct profile_checksum *checksum; // of commands and answers; NULL: none
 };
 
 // Takes over the transport. The format and its strings are borrowed for the object's life and may
@@ -30,7 +38,8 @@ struct message_format {
 struct message *message_new(struct transport *t, const struct message_format *format);
 void message_free(struct message *m); // closes the transport
 
-// Sends and returns the answer without its terminator. GON_E_LINK: no or no usable answer (the link
+// Sends and returns the answer without its terminator, echo, ok_line and checksum; where there is an
+// echo or ok_line it may be empty. GON_E_LINK: no or no usable answer (the link
 // resynchronises by itself before the next query); GON_E_GONE: unplugged; GON_E_DEVICE: the device
 // sends back what it is told (echo). The text then names the query.
 int message_query(struct message *m, const char *command, char *ret_answer, size_t size,
