@@ -272,10 +272,12 @@ struct profile_detector {
     // as the profile has them) before setup is sent.
     struct profile_rules setup;    // sent in this order, all whose condition holds
     char full_scale[PROFILE_NAME]; // value with a ladder: the ranges
+    double ranges[PROFILE_LADDER]; // where its wire carries the full scale itself; else the ladder
+    int ranges_count;
     struct profile_asks read_range;
     char set_range[PROFILE_NAME];
     double range_settle_ms; // after a change of range nothing is believed so long
-    double settle_s;        // of the instrument itself, where it has no time constant
+    double settle_s; // of the instrument, where it has no time constant: taken for one
     // What is asked for one sample. The two are taken in turn, so that a late answer does not fit.
     struct profile_asks sample, sample_monitor; // the second with monitor_aux > 0
     char signal[PROFILE_NAME], monitor[PROFILE_NAME], reference[PROFILE_NAME]; // values

@@ -313,6 +313,8 @@ static const struct cfg_row laser_rows[] = {
 static const struct cfg_row detector_rows[] = {
     RULES(profile_detector, "setup", setup, send_rows, "Sent in this order: all that hold."),
     TEXT(profile_detector, "full_scale", full_scale, "", "The value whose ladder are the ranges."),
+    REALS(profile_detector, "ranges", ranges, ranges_count,
+          "Full scales, where the wire carries the full scale itself and not a ladder's code."),
     ASKS(profile_detector, "read_range", read_range, "What tells the range."),
     TEXT(profile_detector, "set_range", set_range, "", "What sends it."),
     REAL(profile_detector, "range_settle_ms", range_settle_ms, "ms", 0, 60000, "0",
