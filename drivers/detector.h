@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One detector chain: signal and, where wired, the reference monitor, read in one transaction. A
-// value never travels without its flags; a reading that is not a number is an error, never a
+// One detector chain: signal and, where wired, the reference monitor, read in one transaction; made
+// by by_profile.h. Opening one sends nothing: call identify and setup next. A value never travels without its flags; a reading that is not a number is an error, never a
 // number. The driver does I/O; averaging, ranging and settling rules live above (daemon/acquire.h).
 // Thread: instrument.
 #pragma once
@@ -26,7 +26,8 @@ enum detector_flag {
 };
 
 struct detector_sample {
-    double signal_v;  // signed; the in-phase component of a lock-in
+    double signal_v;  // signed; the in-phase component of a lock-in; W or A of another kind. Beyond
+                      // the range: the full scale, and the condition says saturated
     double monitor_v; // NAN when there is no monitor
     double reference_hz; // NAN when there is none
 };
@@ -35,11 +36,14 @@ struct detector_setup {
     double time_constant_s;
     int slope_db;    // 6, 12, 18, 24 per octave
     int monitor_aux; // 1..4; 0: no monitor
+    double wavelength_nm; // of the light, for what is calibrated by it; 0: not known
 };
 
 struct detector_ops {
     int (*identify)(struct detector *d, char *ret_text, size_t size, struct gon_error *err);
-    // Writes the setting, reads it back; ret_time_constant_s is what the device really has.
+    // Writes the settings as far as the device has them, and reads them back. The time constant is
+    // the shortest that is not below the one asked; ret_time_constant_s is what the device has then.
+    // Reserve, coupling, phase and reference stay as the operator set them.
     int (*setup)(struct detector *d, const struct detector_setup *s, double *ret_time_constant_s,
                  struct gon_error *err);
     int (*ranges)(struct detector *d); // how many; range 0 is the most sensitive
@@ -57,13 +61,3 @@ struct detector_ops {
 struct detector {
     const struct detector_ops *ops; // first member of each driver's own struct
 };
-
-// SRS SR830 over RS-232. Opens the link only; call identify and setup next. Queries are repeated up
-// to 3 times when the link fails; every wait gives the clock its turn at least every 50 ms.
-//  - setup chooses the shortest time constant that is not below the one asked, and leaves reserve,
-//    coupling, phase and reference as the operator set them;
-//  - sample is one SNAP?: in-phase, frequency and monitor of one moment. Every other
-//    time it asks for one number more, so that a late or doubled answer does not fit;
-//  - condition also reads the sensitivity back: somebody at the front panel is DETECTOR_UNSETTLED.
-int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *cancel,
-                        struct detector **ret_detector, struct gon_error *err);

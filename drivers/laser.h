@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// One laser. Only daemon/safety calls emission; everything else only reads. Thread: instrument
-// (later the guard process owns the port).
+// One laser; made by by_profile.h. Only daemon/safety calls emission; everything else only reads.
+// Opening one sends nothing: call off first, then identify. Gaps between commands are kept through
+// the clock, which so gets its turn. Thread: instrument (later the guard process owns the port).
 //
 // off: sent with a leading terminator so that a half-sent command cannot swallow it, repeated after
 //      the laser's minimum gap until the read-back says off; safe at any time, any number of times.
@@ -37,31 +38,25 @@ struct laser_ops {
     int (*identify)(struct laser *l, char *ret_text, size_t size, struct gon_error *err);
     // Everything, asked now. Cobolt: 5 commands (6 the first time), 0.1 s each.
     int (*status)(struct laser *l, struct laser_status *ret_status, struct gon_error *err);
-    // One command, 0.1 s at most: whether the laser says that light comes out.
+    // As few commands as possible (Cobolt: one, 0.1 s): whether the laser says that light comes out.
     int (*emission)(struct laser *l, bool *ret_emission, struct gon_error *err);
     int (*set_power)(struct laser *l, double power_w, struct gon_error *err); // read back
     // GON_E_REFUSED: interlock open, key; GON_E_DEVICE: fault, or it does not want to.
     int (*on)(struct laser *l, struct gon_error *err);
     // 0 only when read back, and no start sequence goes on. Never minds the cancel token.
-    // GON_E_DEVICE: told 5 times and it still emits ("LASER MAY BE ON"). Cobolt: sent at once,
+    // GON_E_DEVICE: told 6 times and it still emits ("LASER MAY BE ON"). Cobolt: sent at once,
     // confirmed 0.35 s later.
     int (*off)(struct laser *l, struct gon_error *err);
+    // Renews the lease that the laser itself gives, when that is due; called while emission is on by
+    // whoever renews ours, at least every 200 ms, and never else. NULL: the laser gives none.
+    int (*keep_alive)(struct laser *l, struct gon_error *err);
     int (*reopen)(struct laser *l, struct gon_error *err);
-    const char *(*fault_text)(int code);
+    const char *(*fault_text)(struct laser *l, int code);
     void (*free)(struct laser *l);
 };
 
 struct laser {
     const struct laser_ops *ops; // first member of each driver's own struct
 };
-
-// Cobolt 05-01 series (Rumba) over RS-232 or USB. Opens the link only and sends nothing: call off
-// first, then identify. The laser ignores a command that comes less than 100 ms after the one
-// before; the gaps are kept through the clock, which so gets its turn. Queries are repeated up to 3
-// times when the link fails. An interlock that was opened while the laser was not off needs the key
-// (LASER_NEEDS_KEY) once it is closed again. on is "@cob1" (the sequence with temperatures and key)
-// where autostart is enabled, else "l1": the laser's own settings are not changed.
-int laser_cobolt_open(const char *link, struct clk *clk, const struct cancel *cancel,
-                      struct laser **ret_laser, struct gon_error *err);
 
 const char *laser_state_name(enum laser_state s); // "off", "warming", "emitting", ...

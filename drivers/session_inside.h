@@ -30,7 +30,10 @@ struct session {
 };
 
 void session_init(struct session *s, const struct session_ops *ops, const struct profile *p);
-// An answer brought these values and they are in data: looks whether they tell of a restart.
+// An answer brought these values: those whose "valid" does not hold become unknown.
+void session_doubt(const struct profile *p, struct profile_data *d,
+                   const bool fresh[PROFILE_VALUES]);
+// They are believed and in data: looks whether they tell of a restart.
 void session_saw(struct session *s, const bool fresh[PROFILE_VALUES]);
 // The instrument said no: remembers the meaning; GON_E_REFUSED where a person can change it (busy,
 // interlock, key), else GON_E_DEVICE.
