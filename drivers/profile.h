@@ -36,7 +36,7 @@ enum {
     PROFILE_EXCHANGES = 64,
     PROFILE_WRITES = 24,
     PROFILE_ITEMS = 20, // registers of one write
-    PROFILE_ASKS = 8,
+    PROFILE_ASKS = 16,
     PROFILE_RULES = 24,
     PROFILE_CODES = 96,
     PROFILE_GOLDEN = 48,
@@ -177,10 +177,12 @@ struct profile_errors {
 // --- Modbus instruments --------------------------------------------------------------------------
 
 struct profile_registers {
-    int base;                   // what the manual calls the first register: 0, 1 or 40001
+    int base; // what the manual calls the first register: 0, 1; 40001: 40001, 30001, 10001 and 1
+              // are the first holding and input registers, discrete inputs and coils
     int word_order, byte_order; // enum profile_order
     int block_most;             // registers in one read, 1..125
     int gap_most;               // unwanted registers that may be read along
+    bool single;                // one register is written by function 6
     double timeout_ms, quiet_ms;
 };
 
@@ -188,10 +190,12 @@ struct profile_write {
     char name[PROFILE_NAME];
     char set[PROFILE_ITEMS][PROFILE_TEXT]; // "speed = $speed", "type = 1"; one transaction
     int set_count;
-    char edge[PROFILE_TEXT];   // "input.stop": set and taken back; instead of set
-    char verify[PROFILE_TEXT]; // condition that must hold afterwards
-    bool repeat;               // may be sent again when its answer was lost
-    char then[PROFILE_TEXT];   // as in exchanges
+    char edge[PROFILE_TEXT];    // "input.stop": set and taken back; instead of set
+    char release[PROFILE_NAME]; // the write that takes it back; "": the value is written as 0
+    bool readback;              // the values that were set must be read back the same
+    char verify[PROFILE_TEXT];  // condition that must hold afterwards
+    bool repeat;                // may be sent again when its answer was lost
+    char then[PROFILE_TEXT];    // as in exchanges
     char help[PROFILE_TEXT];
 };
 
@@ -321,6 +325,8 @@ struct profile_selector {
 
 struct profile_inputs {
     struct profile_asks status;
+    char watchdog[PROFILE_NAME]; // write that keeps a relay on; "": none
+    double watchdog_ms;          // at most so far apart, or the relay drops
 };
 
 // --- the simulated instrument --------------------------------------------------------------------

@@ -210,7 +210,8 @@ static const struct cfg_row error_rows[] = {
 
 static const struct cfg_row register_rows[] = {
     WHOLE(profile_registers, "base", base, NULL, 0, 40001, "0",
-          "What the manual calls the first register: 0, 1, 30001 or 40001."),
+          "What the manual calls the first register: 0, 1, or 40001 (then inputs start at 30001, "
+          "discrete inputs at 10001, coils at 1)."),
     CHOICE(profile_registers, "word_order", word_order, orders, "\"high-first\"",
            "Which of a value's two registers has the lower address."),
     CHOICE(profile_registers, "byte_order", byte_order, orders, "\"high-first\"",
@@ -219,6 +220,7 @@ static const struct cfg_row register_rows[] = {
           "Registers that one request may read."),
     WHOLE(profile_registers, "gap_most", gap_most, NULL, 0, 124, "8",
           "Unwanted registers that are read along rather than asking twice."),
+    YES(profile_registers, "single", single, "One register is written by function 6, not 16."),
     REAL(profile_registers, "timeout_ms", timeout_ms, "ms", 10, 200, "200",
          "How long an answer may take."),
     REAL(profile_registers, "quiet_ms", quiet_ms, "ms", 20, 1000, "100",
@@ -231,6 +233,9 @@ static const struct cfg_row write_rows[] = {
           "Values and what they become (\"speed = $speed\"), in one transaction."),
     TEXT(profile_write, "edge", edge, "",
          "Instead: a bit (VALUE.BIT) that acts when it is set and is taken back."),
+    TEXT(profile_write, "release", release, "",
+         "The write that takes the bit back; without one the value is written as 0."),
+    YES(profile_write, "readback", readback, "The values are read back and must be the same."),
     TEXT(profile_write, "verify", verify, "", "Condition that must hold afterwards."),
     YES(profile_write, "repeat", repeat, "May be sent again when its answer was lost."),
     TEXT(profile_write, "then", then, "", "What it changes in the simulated instrument."),
@@ -380,7 +385,10 @@ static const struct cfg_row selector_rows[] = {
     {0}};
 
 static const struct cfg_row input_rows[] = {
-    ASKS(profile_inputs, "status", status, "The values that are read."), {0}};
+    ASKS(profile_inputs, "status", status, "The values that are read."),
+    TEXT(profile_inputs, "watchdog", watchdog, "", "The write that has to be repeated."),
+    REAL(profile_inputs, "watchdog_ms", watchdog_ms, "ms", 0, 60000, "0", "At most so far apart."),
+    {0}};
 
 // --- the simulated instrument --------------------------------------------------------------------
 
