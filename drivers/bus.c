@@ -23,11 +23,12 @@ struct bus {
     int timeout_ms, quiet_ms;
     int64_t gap_ns, ready_ns; // silence between frames; the next request not before
     struct bus_stats stats;
+    int exception; // of the last answer
 };
 
 // One request, to be carried out and to be named in messages.
 struct request {
-    int unit, address, count;
+    int unit, function, address, count;
     uint16_t *ret_registers;   // reading
     const uint16_t *registers; // writing
 };
@@ -117,10 +118,11 @@ static int prepare(struct bus *b, struct gon_error *err)
 static enum master_outcome carry_out(struct bus *b, const struct request *r)
 {
     const int64_t begin_ns = clk_now_ns(b->clk);
-    enum master_outcome o =
-        r->registers
-            ? modbus_master_write(b->master, r->unit, r->address, r->count, r->registers)
-            : modbus_master_read(b->master, r->unit, r->address, r->count, r->ret_registers);
+    enum master_outcome o = r->registers
+                                ? modbus_master_write(b->master, r->unit, r->function, r->address,
+                                                      r->count, r->registers)
+                                : modbus_master_read(b->master, r->unit, r->function, r->address,
+                                                     r->count, r->ret_registers);
     const int64_t end_ns = clk_now_ns(b->clk);
     b->ready_ns = end_ns + b->gap_ns;
     b->stats.requests++;
@@ -128,6 +130,7 @@ static enum master_outcome carry_out(struct bus *b, const struct request *r)
     b->stats.garbled += o == MASTER_GARBLED;
     b->stats.exceptions += o != MASTER_DONE && o < MASTER_SILENT;
     b->out_of_step = o == MASTER_SILENT || o == MASTER_GARBLED;
+    b->exception = o < MASTER_SILENT ? (int)o : 0;
     if (o < MASTER_SILENT) {
         b->stats.last_latency_ns = end_ns - begin_ns;
         if (b->stats.last_latency_ns > b->stats.worst_latency_ns)
@@ -181,34 +184,47 @@ static const char *exception_text(int code)
     }
 }
 
+static const char *what(int function)
+{
+    switch (function) {
+    case 1:
+    case 5:
+    case 15: return "coils";
+    case 2: return "discrete inputs";
+    case 4: return "input registers";
+    default: return "registers";
+    }
+}
+
 static int say(const struct bus *b, const struct request *r, enum master_outcome o, int tries,
                struct gon_error *err)
 {
     const char *verb = r->registers ? "writing" : "reading";
-    const int function = r->registers ? 16 : 3;
     if (o == MASTER_GONE)
         return gon_fail(err, GON_E_GONE, "%s: hung up while %s unit %d", bus_link(b), verb,
                         r->unit);
     if (o < MASTER_SILENT)
         return gon_fail(err, GON_E_DEVICE,
-                        "%s: unit %d %s (exception %d; function %d, %d registers at %04Xh)",
-                        bus_link(b), r->unit, exception_text((int)o), (int)o, function, r->count,
-                        (unsigned)r->address);
-    return gon_fail(err, GON_E_LINK,
-                    "%s: unit %d %s (%s %d registers at %04Xh; %d %s, %d ms each)%s", bus_link(b),
-                    r->unit,
-                    o == MASTER_SILENT ? "does not answer" : "answers what cannot be trusted", verb,
-                    r->count, (unsigned)r->address, tries, tries == 1 ? "try" : "tries",
-                    b->timeout_ms, r->registers ? "; it may have been carried out" : "");
+                        "%s: unit %d %s (exception %d; function %d, %d %s at %04Xh)", bus_link(b),
+                        r->unit, exception_text((int)o), (int)o, r->function, r->count,
+                        what(r->function), (unsigned)r->address);
+    return gon_fail(
+        err, GON_E_LINK, "%s: unit %d %s (%s %d %s at %04Xh; %d %s, %d ms each)%s", bus_link(b),
+        r->unit, o == MASTER_SILENT ? "does not answer" : "answers what cannot be trusted", verb,
+        r->count, what(r->function), (unsigned)r->address, tries, tries == 1 ? "try" : "tries",
+        b->timeout_ms, r->registers ? "; it may have been carried out" : "");
 }
 
-int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_registers,
-             struct gon_error *err)
+int bus_read_table(struct bus *b, int unit, enum bus_table table, int address, int count, int tries,
+                   uint16_t *ret_registers, struct gon_error *err)
 {
+    static const int function[] = {3, 4, 1, 2};
     assert(count >= 1 && count <= 125 && address >= 0 && address + count <= 0x10000);
-    const struct request r = {unit, address, count, .ret_registers = ret_registers};
+    assert(tries >= 1);
+    const struct request r = {unit, function[table], address, count,
+                              .ret_registers = ret_registers};
     enum master_outcome o = MASTER_SILENT;
-    for (int i = 0; i < READ_TRIES; i++) {
+    for (int i = 0; i < tries; i++) {
         if (i > 0 && cancel_requested(b->cancel))
             return gon_fail(err, GON_E_CANCELED, "%s: stopped", bus_link(b));
         b->stats.retries += i > 0;
@@ -220,19 +236,44 @@ int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_regi
         if (o != MASTER_SILENT && o != MASTER_GARBLED)
             break;
     }
-    return say(b, &r, o, READ_TRIES, err);
+    return say(b, &r, o, tries, err);
 }
 
-int bus_write(struct bus *b, int unit, int address, int count, const uint16_t *registers,
-              struct gon_error *err)
+int bus_write_table(struct bus *b, int unit, enum bus_table table, int address, int count,
+                    bool single, const uint16_t *registers, struct gon_error *err)
 {
+    assert(table == BUS_HOLDING || table == BUS_COIL);
     assert(count >= 1 && count <= 123 && address >= 0 && address + count <= 0x10000);
-    const struct request r = {unit, address, count, .registers = registers};
+    const int many = table == BUS_COIL ? 15 : 16, one = table == BUS_COIL ? 5 : 6;
+    const struct request r = {unit, single && count == 1 ? one : many, address, count,
+                              .registers = registers};
     enum master_outcome o;
     int rc = attempt(b, &r, &o, err);
     if (rc < 0)
         return rc;
     return o == MASTER_DONE ? 0 : say(b, &r, o, 1, err);
+}
+
+int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_registers,
+             struct gon_error *err)
+{
+    return bus_read_table(b, unit, BUS_HOLDING, address, count, READ_TRIES, ret_registers, err);
+}
+
+int bus_write(struct bus *b, int unit, int address, int count, const uint16_t *registers,
+              struct gon_error *err)
+{
+    return bus_write_table(b, unit, BUS_HOLDING, address, count, false, registers, err);
+}
+
+int bus_exception(const struct bus *b)
+{
+    return b->exception;
+}
+
+int64_t bus_now_ns(const struct bus *b)
+{
+    return clk_now_ns(b->clk);
 }
 
 const char *bus_link(const struct bus *b)

@@ -20,6 +20,7 @@
 #include "base/clk.h"
 #include "base/err.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct bus;
@@ -36,14 +37,23 @@ int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
 void bus_close(struct bus *b);
 int bus_reopen(struct bus *b, struct gon_error *err); // one try
 
-// Holding registers, function 3. Reads are repeated up to 3 times after resynchronising.
+enum bus_table { BUS_HOLDING, BUS_INPUT, BUS_COIL, BUS_DISCRETE };
+
+// Functions 3, 4, 1 and 2. Reads are repeated, tries (1..3) in all, after resynchronising.
 // GON_E_LINK, GON_E_GONE; GON_E_DEVICE for an exception answer (text says which; busy is waited
-// out, up to 1 s). unit 1..247, count 1..125.
+// out, up to 1 s). unit 1..247, count 1..125; a coil or input is a register of 0 or 1.
+int bus_read_table(struct bus *b, int unit, enum bus_table table, int address, int count, int tries,
+                   uint16_t *ret_registers, struct gon_error *err);
+// Functions 16 and 15; single (count 1): 6 and 5. Sent once; an answer "busy" means that it was not
+// carried out, so then it is sent again. BUS_HOLDING or BUS_COIL, count 1..123.
+int bus_write_table(struct bus *b, int unit, enum bus_table table, int address, int count,
+                    bool single, const uint16_t *registers, struct gon_error *err);
+// Holding registers, functions 3 (3 tries) and 16.
 int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_registers,
              struct gon_error *err);
-// Function 16. Sent once; an answer "busy" means that it was not carried out, so then it is sent
-// again. count 1..123.
 int bus_write(struct bus *b, int unit, int address, int count, const uint16_t *registers,
               struct gon_error *err);
+int bus_exception(const struct bus *b);  // code of the last answer; 0: it was none
+int64_t bus_now_ns(const struct bus *b); // of its clock
 const char *bus_link(const struct bus *b);
 const struct bus_stats *bus_stats(const struct bus *b);

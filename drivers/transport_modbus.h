@@ -38,8 +38,9 @@ void modbus_master_free(struct modbus_master *m);
 // libmodbus' select(): GON_E_SYSTEM. GON_E_GONE when the transport is closed.
 int modbus_master_attach(struct modbus_master *m, struct gon_error *err);
 
-// Functions 3 and 16.
-enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int address, int count,
-                                       uint16_t *ret_registers);
-enum master_outcome modbus_master_write(struct modbus_master *m, int unit, int address, int count,
-                                        const uint16_t *registers);
+// Functions 1, 2, 3 and 4. count 1..125 registers, 1..2000 bits; a bit is a register of 0 or 1.
+enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int function, int address,
+                                       int count, uint16_t *ret_registers);
+// Functions 5 and 6 (count 1), 15 and 16. count 1..123 registers or bits.
+enum master_outcome modbus_master_write(struct modbus_master *m, int unit, int function,
+                                        int address, int count, const uint16_t *registers);

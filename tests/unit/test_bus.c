@@ -308,6 +308,123 @@ static void wrong_unit_function_length_or_checksum_is_no_answer(void **state)
     check_forged((const uint8_t[]){1, 3, 4, 0, 9, 0, 9}, 7, 0x0100);
 }
 
+// --- the other functions, as the Application Protocol 1.1b3 (6.1 to 6.12) shows them
+// --------------
+
+struct shown {
+    uint8_t sent[16], received[16];
+    size_t sent_size, received_size;
+};
+
+static const struct shown *example;
+static int shown_requests;
+
+static size_t framed(const uint8_t *pdu, size_t size, uint8_t *ret_frame)
+{
+    ret_frame[0] = 17;
+    memcpy(ret_frame + 1, pdu, size);
+    const uint16_t crc = sim_modbus_crc(ret_frame, size + 1);
+    ret_frame[size + 1] = (uint8_t)crc;
+    ret_frame[size + 2] = (uint8_t)(crc >> 8);
+    return size + 3;
+}
+
+static void feed_shown(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
+{
+    uint8_t frame[24];
+    shown_requests++;
+    assert_int_equal(size, framed(example->sent, example->sent_size, frame));
+    assert_memory_equal(bytes, frame, size);
+    port_send(p, frame, framed(example->received, example->received_size, frame), t_ns + MS(1));
+}
+
+static struct bus *begin_shown(const struct shown *e)
+{
+    static const struct port_ops ops = {feed_shown, scripted_nothing, scripted_hangup};
+    static struct port p;
+    port_init(&p, &ops);
+    example = e;
+    shown_requests = 0;
+    return begin(&p, NULL);
+}
+
+static void check_read(enum bus_table table, int address, int count, const struct shown *e,
+                       const uint16_t *expected)
+{
+    uint16_t r[24];
+    struct bus *b = begin_shown(e);
+    assert_int_equal(bus_read_table(b, 17, table, address, count, 1, r, NULL), 0);
+    for (int i = 0; i < count; i++)
+        assert_int_equal(r[i], expected[i]);
+    bus_close(b);
+}
+
+static void coils_and_inputs_are_read_as_the_standard_shows(void **state)
+{
+    (void)state;
+    check_read(BUS_COIL, 0x13, 19,
+               &(struct shown){{1, 0, 0x13, 0, 0x13}, {1, 3, 0xcd, 0x6b, 5}, 5, 5},
+               (const uint16_t[]){1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 0, 1, 1, 0, 1, 0, 1});
+    check_read(
+        BUS_DISCRETE, 0xc4, 22,
+        &(struct shown){{2, 0, 0xc4, 0, 0x16}, {2, 3, 0xac, 0xdb, 0x35}, 5, 5},
+        (const uint16_t[]){0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 0, 1, 1, 0, 1, 1, 1, 0, 1, 0, 1, 1});
+    check_read(BUS_INPUT, 8, 1, &(struct shown){{4, 0, 8, 0, 1}, {4, 2, 0, 10}, 5, 4},
+               (const uint16_t[]){10});
+    check_read(BUS_HOLDING, 0x6b, 3,
+               &(struct shown){{3, 0, 0x6b, 0, 3}, {3, 6, 2, 0x2b, 0, 0, 0, 0x64}, 5, 8},
+               (const uint16_t[]){0x22b, 0, 0x64});
+}
+
+static int write_shown(enum bus_table table, int address, int count, bool single,
+                       const uint16_t *values, const struct shown *e)
+{
+    struct bus *b = begin_shown(e);
+    const int rc = bus_write_table(b, 17, table, address, count, single, values, NULL);
+    assert_int_equal(shown_requests, 1);
+    bus_close(b);
+    return rc;
+}
+
+static void coils_and_registers_are_written_as_the_standard_shows(void **state)
+{
+    (void)state;
+    assert_int_equal(
+        write_shown(BUS_COIL, 0xac, 1, true, (const uint16_t[]){1},
+                    &(struct shown){{5, 0, 0xac, 0xff, 0}, {5, 0, 0xac, 0xff, 0}, 5, 5}),
+        0);
+    assert_int_equal(write_shown(BUS_HOLDING, 1, 1, true, (const uint16_t[]){3},
+                                 &(struct shown){{6, 0, 1, 0, 3}, {6, 0, 1, 0, 3}, 5, 5}),
+                     0);
+    assert_int_equal(
+        write_shown(BUS_COIL, 0x13, 10, true, (const uint16_t[]){1, 0, 1, 1, 0, 0, 1, 1, 1, 0},
+                    &(struct shown){{15, 0, 0x13, 0, 10, 2, 0xcd, 1}, {15, 0, 0x13, 0, 10}, 8, 5}),
+        0);
+    assert_int_equal(
+        write_shown(BUS_HOLDING, 1, 2, false, (const uint16_t[]){10, 0x102},
+                    &(struct shown){{16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {16, 0, 1, 0, 2}, 10, 5}),
+        0);
+}
+
+static void an_echo_that_differs_is_no_answer(void **state)
+{
+    const uint16_t three = 3, two[] = {10, 0x102};
+    (void)state;
+    assert_int_equal(write_shown(BUS_HOLDING, 1, 1, true, &three,
+                                 &(struct shown){{6, 0, 1, 0, 3}, {6, 0, 1, 0, 2}, 5, 5}),
+                     GON_E_LINK);
+    assert_int_equal(write_shown(BUS_HOLDING, 1, 1, true, &three,
+                                 &(struct shown){{6, 0, 1, 0, 3}, {6, 0, 2, 0, 3}, 5, 5}),
+                     GON_E_LINK);
+    assert_int_equal(write_shown(BUS_COIL, 1, 1, true, &three,
+                                 &(struct shown){{5, 0, 1, 0xff, 0}, {5, 0, 1, 0, 0}, 5, 5}),
+                     GON_E_LINK);
+    const struct shown other_count = {{16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {16, 0, 1, 0, 1}, 10, 5};
+    const struct shown other_place = {{16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {16, 0, 2, 0, 2}, 10, 5};
+    assert_int_equal(write_shown(BUS_HOLDING, 1, 2, false, two, &other_count), GON_E_LINK);
+    assert_int_equal(write_shown(BUS_HOLDING, 1, 2, false, two, &other_place), GON_E_LINK);
+}
+
 static void a_hang_up_is_gone_and_a_new_plug_works(void **state)
 {
     uint16_t r[2];
@@ -547,6 +664,9 @@ int main(void)
         cmocka_unit_test(what_comes_unasked_is_dropped_before_a_request),
         cmocka_unit_test(a_unit_that_is_not_there_does_not_answer),
         cmocka_unit_test(wrong_unit_function_length_or_checksum_is_no_answer),
+        cmocka_unit_test(coils_and_inputs_are_read_as_the_standard_shows),
+        cmocka_unit_test(coils_and_registers_are_written_as_the_standard_shows),
+        cmocka_unit_test(an_echo_that_differs_is_no_answer),
         cmocka_unit_test(a_hang_up_is_gone_and_a_new_plug_works),
         cmocka_unit_test(reads_can_be_cancelled_and_writes_go_out_anyway),
         cmocka_unit_test(nothing_waits_longer_than_one_answer),
