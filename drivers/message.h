@@ -70,3 +70,5 @@ const struct transport_stats *message_stats(const struct message *m);
 // the whole text but for blanks. A comma, "nan", "inf", 9.9e37 (overflow) or anything left over is
 // an error. Independent of the locale; correct to one unit in the last place.
 int message_number(const char *text, double *ret_value, struct gon_error *err);
+// The same, but 9.9e37 is a number like any other: what it means is left to the caller.
+int message_decimal(const char *text, double *ret_value, struct gon_error *err);

@@ -61,7 +61,7 @@ static double scaled(uint64_t digits, int scale)
     return (double)(scale < 0 ? m / powl(10.0L, -scale) : m * powl(10.0L, scale));
 }
 
-int message_number(const char *text, double *ret_value, struct gon_error *err)
+int message_decimal(const char *text, double *ret_value, struct gon_error *err)
 {
     struct scan s = {.at = text};
     while (*s.at == ' ' || *s.at == '\t')
@@ -80,8 +80,20 @@ int message_number(const char *text, double *ret_value, struct gon_error *err)
     if (!good || *s.at)
         return gon_fail(err, GON_E_LINK, "'%.40s' is not a number", text);
     const double value = scaled(s.digits, s.scale);
-    if (!(value < OVERFLOWED))
-        return gon_fail(err, GON_E_LINK, "'%.40s' means overflow, not a value", text);
+    if (isinf(value))
+        return gon_fail(err, GON_E_LINK, "'%.40s' is larger than any number", text);
     *ret_value = negative ? -value : value;
+    return 0;
+}
+
+int message_number(const char *text, double *ret_value, struct gon_error *err)
+{
+    double value;
+    int rc = message_decimal(text, &value, err);
+    if (rc < 0)
+        return rc;
+    if (!(fabs(value) < OVERFLOWED))
+        return gon_fail(err, GON_E_LINK, "'%.40s' means overflow, not a value", text);
+    *ret_value = value;
     return 0;
 }
