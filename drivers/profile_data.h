@@ -15,16 +15,26 @@ struct profile_data {
 };
 
 void profile_data_clear(struct profile_data *d); // nothing is known
+// NAN, and a number that is no word's: it becomes unknown.
 void profile_data_set(const struct profile *p, struct profile_data *d, int value, double number);
-// A word's number is found; GON_E_INPUT for a word that is not in the list or a text too long.
+// As a profile or a person writes it: the text itself, a word, or a number (profile_literal).
+// GON_E_INPUT for what is none of them or a text too long.
 int profile_data_set_text(const struct profile *p, struct profile_data *d, int value,
                           const char *text, struct gon_error *err);
 // The number of a value by its name; NAN when the name is "" or it is not known.
 double profile_data_number(const struct profile *p, const struct profile_data *d, const char *name);
 
+// A number as it is written beside a value: decimal, 0x07, a word of the value (letter case does
+// not matter; its number is its index, counted from "first"), or over. NULL: of no value. Whole
+// numbers may have words, too: the wire then carries the number. GON_E_INPUT.
+int profile_literal(const struct profile_value *v, const char *text, double *ret_number,
+                    struct gon_error *err);
+// The word of a number; NULL: it has none.
+const char *profile_word(const struct profile_value *v, double number);
+
 // What the wire carries for a number: GON_E_INPUT beyond min..max, for a number that is not on its
 // ladder (a ladder takes the nearest of its numbers within 1e-6 relative), or a whole number's
-// fraction.
+// fraction. INFINITY is the first over. A scale of 0 is 1.
 int profile_wire(const struct profile_value *v, double number, double *ret_wire,
                  struct gon_error *err);
 // And back. INFINITY for an over, NAN for an invalid one; GON_E_LINK beyond min..max or the ladder:
@@ -47,7 +57,7 @@ int profile_assign(const struct profile *p, const char *text, const struct profi
                    int (*take)(void *ctx, int value, double number, const char *text,
                                struct gon_error *err),
                    void *ctx, struct gon_error *err);
-// The same into data; values that texts name are set as known.
+// The same into data.
 int profile_assign_data(const struct profile *p, const char *text,
                         const struct profile_param *params, struct profile_data *d,
                         struct gon_error *err);

@@ -9,11 +9,16 @@
 //   blank          reading: any number of blanks, also none; writing: one blank
 //   {{ }} [[ ]]    the characters { } [ ]
 //
-// A value ends where the pattern's next character stands; a text takes as little as possible. The
-// answer has to fit as a whole, from its first to its last character. Numbers are read by
-// message_decimal (a decimal point, never a comma; no nan, no inf). Thread: any.
+// A number takes as much as can be read as one, a text as little as possible and at least one
+// character; blanks before numbers and words are skipped. The answer has to fit as a whole, from
+// its first to its last character, and be at most PROFILE_ANSWER long. Numbers are read by
+// message_decimal (a decimal point, never a comma; no nan, no inf); in words letter case does not
+// matter. Between two values something must stand. A sent value has no control characters.
+// Thread: any.
 #pragma once
 #include "drivers/profile_data.h"
+
+enum { PROFILE_ANSWER = 1024 };
 
 // GON_E_INPUT: a value is not known, does not fit (profile_wire) or there is no room.
 int profile_text_write(const struct profile *p, const char *pattern, const struct profile_data *d,
