@@ -6,7 +6,20 @@
 
 #define FORGET_NS 20000000 // half a frame without baud timing
 
-enum { READ = 0x03, WRITE_ONE = 0x06, WRITE_MANY = 0x10, READ_WRITE = 0x17, PDU_MOST = 253 };
+enum {
+    READ_COILS = 0x01,
+    READ_DISCRETES = 0x02,
+    READ = 0x03,
+    READ_INPUTS = 0x04,
+    WRITE_COIL = 0x05,
+    WRITE_ONE = 0x06,
+    WRITE_COILS = 0x0f,
+    WRITE_MANY = 0x10,
+    READ_WRITE = 0x17,
+    PDU_MOST = 253,
+    REGISTERS_MOST = 125,
+    BITS_MOST = 2000
+};
 
 uint16_t sim_modbus_crc(const uint8_t *bytes, size_t size)
 {
@@ -39,8 +52,13 @@ static int request_size(const uint8_t *pdu, size_t have)
     if (have < 1)
         return 0;
     switch (pdu[0]) {
-    case READ: return 5;
+    case READ_COILS:
+    case READ_DISCRETES:
+    case READ:
+    case READ_INPUTS:
+    case WRITE_COIL:
     case WRITE_ONE: return 5;
+    case WRITE_COILS:
     case WRITE_MANY: return have < 6 ? 0 : 6 + pdu[5];
     case READ_WRITE: return have < 10 ? 0 : 10 + pdu[9];
     default: return -1;
@@ -52,16 +70,25 @@ struct answer {
     int size;
 };
 
-static int read_registers(const struct sim_modbus_unit *u, const uint8_t *where, int most,
+// Address and count, where the count may be that.
+static int span(const uint8_t *where, int most, int *ret_address, int *ret_count)
+{
+    *ret_address = word(where);
+    *ret_count = word(where + 2);
+    if (*ret_count < 1 || *ret_count > most)
+        return MODBUS_BAD_VALUE;
+    return *ret_address + *ret_count > 0x10000 ? MODBUS_BAD_ADDRESS : 0;
+}
+
+static int read_registers(const struct sim_modbus_unit *u, const uint8_t *where, bool inputs,
                           int64_t t_ns, struct answer *a)
 {
-    int address = word(where), count = word(where + 2);
-    if (count < 1 || count > most)
-        return MODBUS_BAD_VALUE;
-    if (address + count > 0x10000)
-        return MODBUS_BAD_ADDRESS;
-    uint16_t registers[125];
-    int exception = u->read(u->ctx, address, count, registers, t_ns);
+    int address, count, exception = span(where, REGISTERS_MOST, &address, &count);
+    if (exception)
+        return exception;
+    uint16_t registers[REGISTERS_MOST];
+    exception = inputs ? u->tables->read(u->ctx, MODBUS_INPUTS, address, count, registers, t_ns)
+                       : u->read(u->ctx, address, count, registers, t_ns);
     if (exception)
         return exception;
     a->pdu[1] = (uint8_t)(2 * count);
@@ -71,18 +98,64 @@ static int read_registers(const struct sim_modbus_unit *u, const uint8_t *where,
     return 0;
 }
 
+static int read_bits(const struct sim_modbus_unit *u, const uint8_t *where,
+                     enum sim_modbus_table table, int64_t t_ns, struct answer *a)
+{
+    int address, count, exception = span(where, BITS_MOST, &address, &count);
+    if (exception)
+        return exception;
+    uint16_t bits[BITS_MOST];
+    exception = u->tables->read(u->ctx, table, address, count, bits, t_ns);
+    if (exception)
+        return exception;
+    int bytes = (count + 7) / 8;
+    a->pdu[1] = (uint8_t)bytes;
+    memset(a->pdu + 2, 0, (size_t)bytes);
+    for (int i = 0; i < count; i++)
+        a->pdu[2 + i / 8] |= (uint8_t)((bits[i] != 0) << i % 8);
+    a->size = 2 + bytes;
+    return 0;
+}
+
+static int write_coil(const struct sim_modbus_unit *u, const uint8_t *where, int64_t t_ns)
+{
+    uint16_t bit = word(where + 2) != 0;
+    if (bit && word(where + 2) != 0xff00)
+        return MODBUS_BAD_VALUE;
+    return u->tables->write_coils(u->ctx, word(where), 1, &bit, t_ns);
+}
+
+static int write_coils(const struct sim_modbus_unit *u, const uint8_t *where, int64_t t_ns)
+{
+    int address, count, exception = span(where, 0x7b0, &address, &count);
+    if (exception)
+        return exception;
+    if (where[4] != (count + 7) / 8)
+        return MODBUS_BAD_VALUE;
+    uint16_t bits[BITS_MOST];
+    for (int i = 0; i < count; i++)
+        bits[i] = where[5 + i / 8] >> i % 8 & 1;
+    return u->tables->write_coils(u->ctx, address, count, bits, t_ns);
+}
+
 static int write_registers(const struct sim_modbus_unit *u, const uint8_t *where, int most,
                            int64_t t_ns)
 {
-    int address = word(where), count = word(where + 2), bytes = where[4];
-    if (count < 1 || count > most || bytes != 2 * count)
+    int address, count, exception = span(where, most, &address, &count);
+    if (exception)
+        return exception;
+    if (where[4] != 2 * count)
         return MODBUS_BAD_VALUE;
-    if (address + count > 0x10000)
-        return MODBUS_BAD_ADDRESS;
-    uint16_t registers[125];
+    uint16_t registers[REGISTERS_MOST];
     for (int i = 0; i < count; i++)
         registers[i] = (uint16_t)word(where + 5 + 2 * i);
     return u->write(u->ctx, address, count, registers, t_ns);
+}
+
+static bool of_tables(uint8_t function)
+{
+    return function == READ_COILS || function == READ_DISCRETES || function == READ_INPUTS ||
+           function == WRITE_COIL || function == WRITE_COILS;
 }
 
 static int carry_out(const struct sim_modbus_unit *u, const uint8_t *pdu, int size, int64_t t_ns,
@@ -90,9 +163,19 @@ static int carry_out(const struct sim_modbus_unit *u, const uint8_t *pdu, int si
 {
     if (request_size(pdu, (size_t)size) != size)
         return request_size(pdu, (size_t)size) < 0 ? MODBUS_BAD_FUNCTION : MODBUS_BAD_VALUE;
+    if (of_tables(pdu[0]) && !u->tables)
+        return MODBUS_BAD_FUNCTION;
     int exception;
     switch (pdu[0]) {
-    case READ: return read_registers(u, pdu + 1, 125, t_ns, a);
+    case READ_COILS: return read_bits(u, pdu + 1, MODBUS_COILS, t_ns, a);
+    case READ_DISCRETES: return read_bits(u, pdu + 1, MODBUS_DISCRETES, t_ns, a);
+    case READ:
+    case READ_INPUTS: return read_registers(u, pdu + 1, pdu[0] == READ_INPUTS, t_ns, a);
+    case WRITE_COIL:
+    case WRITE_COILS:
+        memcpy(a->pdu, pdu, 5);
+        a->size = 5;
+        return pdu[0] == WRITE_COIL ? write_coil(u, pdu + 1, t_ns) : write_coils(u, pdu + 1, t_ns);
     case WRITE_ONE: {
         uint16_t value = (uint16_t)word(pdu + 3);
         memcpy(a->pdu, pdu, 5);
@@ -105,7 +188,7 @@ static int carry_out(const struct sim_modbus_unit *u, const uint8_t *pdu, int si
         return write_registers(u, pdu + 1, 123, t_ns);
     default: // READ_WRITE: the write comes first
         exception = write_registers(u, pdu + 5, 121, t_ns);
-        return exception ? exception : read_registers(u, pdu + 1, 125, t_ns, a);
+        return exception ? exception : read_registers(u, pdu + 1, false, t_ns, a);
     }
 }
 
@@ -123,7 +206,7 @@ static bool answer(struct sim_modbus *m, int id, const uint8_t *pdu, int size, i
 {
     m->port.frames_in++;
     if (id == 0) {
-        for (int i = 0; i < m->units && pdu[0] != READ; i++)
+        for (int i = 0; i < m->units && pdu[0] > READ_INPUTS; i++)
             carry_out(&m->unit[i], pdu, size, t_ns, a);
         return false;
     }

@@ -272,7 +272,8 @@ static void another_kind_of_unit_is_refused_and_not_written_to(void **state)
     (void)state;
     struct axis *a = begin(2), *other = axis_az_new(bus, 9), *absent = axis_az_new(bus, 10);
     sim_modbus_add(&bench.axes_port[0],
-                   (struct sim_modbus_unit){9, read_other, write_other, &writes});
+                   (struct sim_modbus_unit){
+                       .id = 9, .read = read_other, .write = write_other, .ctx = &writes});
     assert_int_equal(other->ops->identify(other, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "unit 9 does not look like an AZ driver"));
     assert_int_equal(writes, 0);

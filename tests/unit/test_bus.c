@@ -69,8 +69,10 @@ static void slave_init(bool tcp)
     memset(&slave, 0, sizeof slave);
     sim_modbus_init(&slave.m, tcp, 0, MS(2));
     for (int u = 0; u < 2; u++) {
-        sim_modbus_add(
-            &slave.m, (struct sim_modbus_unit){u + 1, read_named, write_named, slave.registers[u]});
+        sim_modbus_add(&slave.m, (struct sim_modbus_unit){.id = u + 1,
+                                                          .read = read_named,
+                                                          .write = write_named,
+                                                          .ctx = slave.registers[u]});
         for (int i = 0; i < REGISTERS; i++)
             slave.registers[u][i] = (uint16_t)((u + 1) * 1000 + i);
     }

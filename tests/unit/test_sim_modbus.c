@@ -46,8 +46,11 @@ static struct plain *plain(bool tcp, int64_t gap_ns)
 {
     struct plain *p = calloc(1, sizeof *p);
     sim_modbus_init(&p->m, tcp, gap_ns, 0);
-    sim_modbus_add(&p->m, (struct sim_modbus_unit){7, read_plain, write_plain, p->registers});
-    sim_modbus_add(&p->m, (struct sim_modbus_unit){9, read_plain, write_plain, p->others});
+    sim_modbus_add(&p->m,
+                   (struct sim_modbus_unit){
+                       .id = 7, .read = read_plain, .write = write_plain, .ctx = p->registers});
+    sim_modbus_add(&p->m, (struct sim_modbus_unit){
+                              .id = 9, .read = read_plain, .write = write_plain, .ctx = p->others});
     return p;
 }
 
@@ -128,6 +131,71 @@ static void bad_requests_get_exceptions(void **state)
     exchange(p, "07 10 00 00 00 02 02 00 01", "07 90 03"); // count and bytes disagree
     exchange(p, "07 06 00 10 00 01", "07 86 02");
     free(p);
+}
+
+// The memory of the examples in the Application Protocol 1.1b3, chapter 6; coils take what is
+// written.
+struct tables {
+    uint16_t coils[64];
+};
+
+static int read_tables(void *ctx, enum sim_modbus_table table, int address, int count,
+                       uint16_t *ret, int64_t t_ns)
+{
+    static const uint8_t coils[] = {0xcd, 0x6b, 0x05}, discretes[] = {0xac, 0xdb, 0x35};
+    (void)t_ns;
+    (void)ctx;
+    for (int i = 0; i < count; i++) {
+        if (table == MODBUS_INPUTS && address == 8)
+            ret[i] = 10;
+        else if (table == MODBUS_COILS && address == 19)
+            ret[i] = coils[i / 8] >> i % 8 & 1;
+        else if (table == MODBUS_DISCRETES && address == 196)
+            ret[i] = discretes[i / 8] >> i % 8 & 1;
+        else
+            return MODBUS_BAD_ADDRESS;
+    }
+    return 0;
+}
+
+static int write_tables(void *ctx, int address, int count, const uint16_t *values, int64_t t_ns)
+{
+    struct tables *t = ctx;
+    (void)t_ns;
+    address -= address >= 160 ? 160 : 0; // where the example's coil is
+    if (address + count > 64)
+        return MODBUS_BAD_ADDRESS;
+    memcpy(t->coils + address, values, (size_t)count * 2);
+    return 0;
+}
+
+static void the_other_tables_answer_as_in_the_standards_examples(void **state)
+{
+    (void)state;
+    static const struct sim_modbus_tables ops = {read_tables, write_tables};
+    struct tables t = {.coils = {0}};
+    for (int gap = 0; gap < 2; gap++) {
+        struct plain *p = plain(false, gap * MS(0.3));
+        exchange(p, "07 01 00 13 00 13", "07 81 01"); // it has only holding registers
+        exchange(p, "07 05 00 AC FF 00", "07 85 01");
+        sim_modbus_add(
+            &p->m,
+            (struct sim_modbus_unit){
+                .id = 8, .read = read_plain, .write = write_plain, .ctx = &t, .tables = &ops});
+        exchange(p, "08 01 00 13 00 13", "08 01 03 CD 6B 05");
+        exchange(p, "08 02 00 C4 00 16", "08 02 03 AC DB 35");
+        exchange(p, "08 04 00 08 00 01", "08 04 02 00 0A");
+        exchange(p, "08 05 00 AC FF 00", "08 05 00 AC FF 00");
+        exchange(p, "08 0F 00 13 00 0A 02 CD 01", "08 0F 00 13 00 0A");
+        assert_int_equal(t.coils[172 - 160], 1);
+        for (int i = 0; i < 10; i++)
+            assert_int_equal(t.coils[19 + i], 0x1cd >> i & 1);
+        exchange(p, "08 05 00 AC 00 01", "08 85 03"); // neither on nor off
+        exchange(p, "08 0F 00 13 00 0A 01 CD", "08 8F 03");
+        exchange(p, "08 01 00 13 07 D1", "08 81 03"); // 2001
+        exchange(p, "08 04 00 09 00 01", "08 84 02");
+        free(p);
+    }
 }
 
 static void strangers_and_broken_frames_get_silence(void **state)
@@ -546,6 +614,7 @@ int main(void)
         cmocka_unit_test(crc_of_known_frames),
         cmocka_unit_test(every_function_answers_as_the_standard_says),
         cmocka_unit_test(bad_requests_get_exceptions),
+        cmocka_unit_test(the_other_tables_answer_as_in_the_standards_examples),
         cmocka_unit_test(strangers_and_broken_frames_get_silence),
         cmocka_unit_test(silence_ends_a_frame_and_only_silence),
         cmocka_unit_test(without_baud_timing_frames_end_by_their_length),
