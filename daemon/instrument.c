@@ -4,8 +4,11 @@
 #include "campaign/bench.h"
 #include "daemon/instrument_inside.h"
 #include "drivers/bus.h"
+#include "drivers/by_profile.h"
+#include "drivers/profile.h"
 
 #include <assert.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -124,28 +127,52 @@ enum instrument_part instrument_lost(const struct instrument *in)
     return part;
 }
 
-static int connect_bus(struct instrument *in, struct motor *m, int unit, struct gon_error *err)
+static void keep_first(void *ctx, const char *line)
+{
+    struct gon_error *err = ctx;
+    if (!*err->text)
+        snprintf(err->text, sizeof err->text, "%s", line);
+}
+
+// The kind of controller is the name of a profile.
+static int make_axis(struct motor *m, struct bus *bus, struct gon_error *err)
+{
+    char path[PATH_MAX];
+    struct gon_error why = {0};
+    int rc = m->profile ? 0
+                        : profile_find(bench_axis_drivers[m->config->driver], NULL, path,
+                                       sizeof path, err);
+    if (rc < 0)
+        return rc;
+    if (!m->profile &&
+        profile_load(path, (struct cfg_sink){keep_first, &why}, &m->profile, NULL) < 0)
+        return gon_fail(err, GON_E_INPUT, "%s", why.text);
+    m->axis = axis_by_profile(m->profile, bus, m->config->unit);
+    return m->axis ? 0 : gon_fail(err, GON_E_SYSTEM, "out of memory");
+}
+
+static int connect_bus(struct instrument *in, struct motor *m, struct gon_error *err)
 {
     const struct bench_bus *config = &in->bench->buses[m->bus];
     struct bus **bus = &in->bus[m->bus];
     int rc = *bus ? bus_reopen(*bus, err)
                   : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL,
                              bus, err);
-    if (rc >= 0 && !m->axis && !(m->axis = axis_az_new(*bus, unit)))
-        return gon_fail(err, GON_E_SYSTEM, "out of memory");
-    return rc;
+    return rc >= 0 && !m->axis ? make_axis(m, *bus, err) : rc;
 }
 
 // Units share their bus: the bus is only reopened when the unit does not answer on it as it is.
 static int connect_axis(struct instrument *in, enum instrument_part part, struct gon_error *err)
 {
     struct motor *m = &in->motor[part];
-    if (!m->axis && m->bus >= 0 && in->bus[m->bus] &&
-        !(m->axis = axis_az_new(in->bus[m->bus], m->config->unit)))
-        return gon_fail(err, GON_E_SYSTEM, "out of memory");
-    int rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
+    int rc = 0;
+    if (!m->axis && m->bus >= 0 && in->bus[m->bus])
+        rc = make_axis(m, in->bus[m->bus], err);
+    if (rc < 0)
+        return rc;
+    rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
     if (rc < 0 && m->bus >= 0) {
-        rc = connect_bus(in, m, m->config->unit, err);
+        rc = connect_bus(in, m, err);
         if (rc >= 0)
             rc = m->axis->ops->identify(m->axis, err);
     }
@@ -316,6 +343,7 @@ bool instrument_free(struct instrument *in)
         if (in->motor[i].axis) {
             in->motor[i].axis->ops->stop(in->motor[i].axis, NULL);
             in->motor[i].axis->ops->free(in->motor[i].axis);
+            free(in->motor[i].profile);
         }
     for (int i = 0; i < BENCH_BUSES; i++)
         bus_close(in->bus[i]);

@@ -54,7 +54,7 @@ int instrument_place(struct instrument *in, enum instrument_part part, struct ax
         .homed = s.homed,
         .alarm = s.alarm,
         .alarm_code = s.alarm_code,
-        .alarm_text = s.alarm ? m->axis->ops->alarm_text(s.alarm_code) : "",
+        .alarm_text = s.alarm ? m->axis->ops->alarm_text(m->axis, s.alarm_code) : "",
     };
     m->seen_ns = instrument_now_ns(in);
     *ret_place = m->place;

@@ -6,6 +6,7 @@
 #include "daemon/instrument.h"
 
 struct bus;
+struct profile;
 
 // The clock that drivers and waits use: its sleeping renews the laser's lease.
 struct breathing {
@@ -16,6 +17,7 @@ struct breathing {
 
 struct motor {
     const struct bench_axis *config;
+    struct profile *profile; // of its kind of controller; NULL: made from ready objects
     struct axis *axis;
     int bus; // index; -1: made from ready objects
     struct axis_place place;

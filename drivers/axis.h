@@ -3,7 +3,7 @@
 // the driver does I/O. No call waits for motion; each is one or two transactions. Thread:
 // instrument.
 //
-// move_abs is never repeated by a driver: when its answer is lost, the caller reads the status and
+// Axes are made from profiles (by_profile.h). move_abs is never repeated by a driver: when its answer is lost, the caller reads the status and
 // decides. stop may be repeated and is.
 #pragma once
 #include "base/err.h"
@@ -12,14 +12,13 @@
 #include <stdint.h>
 
 struct axis;
-struct bus;
 
 struct axis_status {
     int32_t position_steps; // encoder
     int32_t target_steps; // at rest: its command position; while it moves: where the last move that
                           // it acknowledged leads, or without one where its profile is now
     bool moving, in_position, ready, homed;
-    bool alarm;
+    bool alarm, limit, following; // limit: stands at a limit switch; following: missed its target
     int alarm_code; // 0: none; the text is in alarm_text
 };
 
@@ -33,17 +32,10 @@ struct axis_ops {
     int (*stop)(struct axis *a, struct gon_error *err);
     int (*home)(struct axis *a, struct gon_error *err);
     int (*reset_alarm)(struct axis *a, struct gon_error *err);
-    const char *(*alarm_text)(int code);
+    const char *(*alarm_text)(const struct axis *a, int code);
     void (*free)(struct axis *a);
 };
 
 struct axis {
     const struct axis_ops *ops; // first member of each driver's own struct
 };
-
-// Oriental Motor AZ (and its relatives with the same core map: CVD, BLV-R). The bus is borrowed.
-// unit: 1..247. status is two reads of 4 and 8 registers, 10 ms at 115200 baud with the silent
-// gaps. Speeds are 1..4,000,000 steps/s, accelerations 1..1,000,000,000 steps/s2 (the controller's
-// unit is 0.001 kHz/s, the same). The bit "homed" (HOME-END) and the command position are not
-// verified against the manual.
-struct axis *axis_az_new(struct bus *bus, int unit);

@@ -42,7 +42,7 @@ void session_saw(struct session *s, const bool fresh[PROFILE_VALUES])
     profile_when_uses(p, p->identify.restarted, uses);
     for (int i = 0; i < p->values_count; i++)
         new = new || (uses[i] && fresh[i]);
-    if (new && profile_when(p, p->identify.restarted, &s->data))
+    if (new &&profile_when(p, p->identify.restarted, &s->data))
         s->restarted = true;
 }
 
@@ -196,7 +196,9 @@ int session_identify(struct session *s, char *ret_title, size_t size, struct gon
     for (int i = 0; i < p->identify.refuse.count; i++) {
         const struct profile_rule *r = &p->identify.refuse.rule[i];
         if (session_holds(s, r->when))
-            return gon_fail(err, GON_E_DEVICE, "%s: is '%s': %s", session_link(s), title, r->text);
+            return *title ? gon_fail(err, GON_E_DEVICE, "%s: is '%s': %s", session_link(s), title,
+                                     r->text)
+                          : gon_fail(err, GON_E_DEVICE, "%s %s", session_link(s), r->text);
     }
     snprintf(ret_title, size, "%s", title);
     return 0;

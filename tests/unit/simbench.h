@@ -182,8 +182,9 @@ static inline int simbench_axis_reset(struct axis *a, struct gon_error *err)
     return rc;
 }
 
-static inline const char *simbench_alarm_text(int code)
+static inline const char *simbench_alarm_text(const struct axis *a, int code)
 {
+    (void)a;
     return code == 0x30 ? "overload" : "";
 }
 

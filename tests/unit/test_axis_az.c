@@ -4,6 +4,8 @@
 #include "drivers/axis.h"
 
 #include "drivers/bus.h"
+#include "drivers/by_profile.h"
+#include "drivers/profile.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
 #include "tests/unit/vline.h"
@@ -24,6 +26,7 @@ static struct {
     int frames;
 } tap;
 static struct bus *bus;
+static struct profile *az;
 
 static void feed_tapped(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
 {
@@ -50,7 +53,7 @@ static struct axis *begin(int unit)
     struct clk *clk = vline_begin(&tap.line.port);
     if (bus_open(vline.bus, 50, 100, clk, NULL, &bus, &err) < 0)
         fail_msg("%s", err.text);
-    struct axis *a = axis_az_new(bus, unit);
+    struct axis *a = axis_by_profile(az, bus, unit);
     assert_int_equal(a->ops->identify(a, &err), 0);
     tap.frames = 0;
     return a;
@@ -235,9 +238,9 @@ static void an_alarm_has_a_code_and_a_text_and_can_be_reset(void **state)
     struct axis_status s = look(a);
     assert_true(s.alarm && !s.ready);
     assert_int_equal(s.alarm_code, 0x66);
-    assert_string_equal(a->ops->alarm_text(0x66), "limit switch reached");
-    assert_string_equal(a->ops->alarm_text(0x99), "not in the list of alarms");
-    assert_string_equal(a->ops->alarm_text(0), "no alarm");
+    assert_string_equal(a->ops->alarm_text(a, 0x66), "limit switch reached");
+    assert_string_equal(a->ops->alarm_text(a, 0x99), "not in the list of alarms");
+    assert_string_equal(a->ops->alarm_text(a, 0), "no alarm");
     assert_int_equal(a->ops->reset_alarm(a, NULL), 0);
     assert_false(look(a).alarm);
     sim_az_raise(&bench.az[1], 0x30, vline.clk.t_ns); // a second edge
@@ -270,7 +273,8 @@ static void another_kind_of_unit_is_refused_and_not_written_to(void **state)
     struct gon_error err;
     int writes = 0;
     (void)state;
-    struct axis *a = begin(2), *other = axis_az_new(bus, 9), *absent = axis_az_new(bus, 10);
+    struct axis *a = begin(2), *other = axis_by_profile(az, bus, 9),
+                *absent = axis_by_profile(az, bus, 10);
     sim_modbus_add(&bench.axes_port[0],
                    (struct sim_modbus_unit){
                        .id = 9, .read = read_other, .write = write_other, .ctx = &writes});
@@ -288,7 +292,7 @@ static void no_wrong_position_under_faults(void **state)
 {
     int good = 0, wrong = 0;
     (void)state;
-    struct axis *a = begin(1), *b = axis_az_new(bus, 2);
+    struct axis *a = begin(1), *b = axis_by_profile(az, bus, 2);
     assert_int_equal(a->ops->move_abs(a, 1111, 20000, 60000, NULL), 0);
     assert_int_equal(b->ops->move_abs(b, -2222, 20000, 60000, NULL), 0);
     run_for(5);
@@ -311,6 +315,26 @@ static void no_wrong_position_under_faults(void **state)
     end(a);
 }
 
+static void say(void *ctx, const char *line)
+{
+    (void)ctx;
+    print_error("%s\n", line);
+}
+
+static int load_profile(void **state)
+{
+    (void)state;
+    return profile_load("configs/profiles/oriental-az.cfg", (struct cfg_sink){say, NULL}, &az,
+                        NULL);
+}
+
+static int free_profile(void **state)
+{
+    (void)state;
+    free(az);
+    return 0;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -327,5 +351,5 @@ int main(void)
         cmocka_unit_test(another_kind_of_unit_is_refused_and_not_written_to),
         cmocka_unit_test(no_wrong_position_under_faults),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, load_profile, free_profile);
 }
