@@ -202,7 +202,7 @@ static bool ends(const struct actor_message *m, char byte)
 static void take(struct actor_message *m, int64_t t_ns)
 {
     size_t blank = 0;
-    while (blank < m->have && m->in[blank] == ' ')
+    while (blank < m->have && strchr(" \n", m->in[blank]) && m->in[blank])
         blank++;
     if (blank < m->have && m->have + 1 < sizeof m->in) // else too long to be one
         command(m, m->in + blank, m->have - blank, t_ns);
