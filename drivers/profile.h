@@ -75,7 +75,8 @@ struct profile_bit {
 
 // number = wire * scale + offset, or scale / wire + offset when inverse. A ladder is a list of
 // numbers of which the wire carries the index (counted from first). Words likewise: the wire
-// carries the word, the number is its index.
+// carries the word, the number is its index. A whole number may have words, too: names of numbers,
+// counted from ladder_first, of which the wire carries the number.
 struct profile_value {
     char name[PROFILE_NAME];
     int type; // enum profile_type
@@ -103,6 +104,7 @@ struct profile_value {
     int word_order;   // 0: as registers.word_order; else 1 + enum profile_order
     int access;       // enum profile_access
     bool alone;       // never read in a block with its neighbours
+    char shares[PROFILE_NAME]; // lies in registers of that other value, and is meant to; "": none
 };
 
 // --- message instruments -------------------------------------------------------------------------

@@ -118,9 +118,9 @@ static const struct cfg_row value_rows[] = {
     REALS(profile_value, "ladder", ladder, ladder_count,
           "The numbers it can have, in the order of the codes that the wire carries for them."),
     WHOLE(profile_value, "ladder_first", ladder_first, NULL, -1000, 1000, "0",
-          "The code of the ladder's first number."),
+          "The code of the ladder's or the words' first."),
     TEXTS(profile_value, "words", words, words_count,
-          "The words it can be; its number is the place in this list, from 0."),
+          "The words it can be, numbered from ladder_first; of int and hex: names of numbers."),
     GROUPS(profile_value, "bits", bits, bits_count, bit_rows, "Names of its bits."),
     TEXT(profile_value, "valid", valid, "", "Condition without which it means nothing."),
     TEXT(profile_value, "help", help, "", "What it is."),
@@ -132,6 +132,8 @@ static const struct cfg_row value_rows[] = {
            "Modbus: which of two registers comes first."),
     CHOICE(profile_value, "access", access, accesses, "\"rw\"", "Modbus: read, written or both."),
     YES(profile_value, "alone", alone, "Modbus: never read together with its neighbours."),
+    TEXT(profile_value, "shares", shares, "",
+         "Modbus: the other value in whose registers it lies on purpose."),
     {0}};
 
 // --- messages ------------------------------------------------------------------------------------
