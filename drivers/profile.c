@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/profile.h"
 
+#include "drivers/profile_check.h"
+
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +17,7 @@ static int take(struct cfg_file *f, struct profile **ret_profile, char **ret_tex
     int rc = GON_E_INPUT;
     if (!p || (ret_text && f && !text))
         rc = GON_E_SYSTEM;
-    else if (f && cfg_take(f, profile_schema, p) == 0)
+    else if (f && cfg_take(f, profile_schema, p) == 0 && profile_check(f, p) == 0)
         rc = 0;
     if (rc < 0) {
         free(p);
