@@ -140,8 +140,19 @@ void safety_obey(struct safety *s, const struct cancel *stop)
     s->obeyed = false;
 }
 
+// The lease that the laser itself gives. When renewing fails it runs out: that is what it is for.
+static void keep_alive(struct safety *s)
+{
+    if (!s->emission || s->pending || s->busy || cancel_requested(s->stop) ||
+        !s->laser->ops->keep_alive)
+        return;
+    s->busy = true;
+    talked(s, s->laser->ops->keep_alive(s->laser, NULL));
+}
+
 bool safety_tick(struct safety *s)
 {
+    keep_alive(s);
     const int64_t now_ns = clk_now_ns(s->clk);
     if (s->emission && now_ns - s->tick_ns > s->worst_gap_ns)
         s->worst_gap_ns = now_ns - s->tick_ns;
@@ -165,7 +176,7 @@ int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err)
 
 const char *safety_fault_text(const struct safety *s, int code)
 {
-    const char *text = s->laser->ops->fault_text ? s->laser->ops->fault_text(code) : NULL;
+    const char *text = s->laser->ops->fault_text ? s->laser->ops->fault_text(s->laser, code) : NULL;
     return text ? text : "no text for it";
 }
 

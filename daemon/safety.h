@@ -11,8 +11,9 @@
 //  - a stop is obeyed whatever the thread waits for (safety_obey): the next tick tells that off is
 //    due, once for each stop; whoever ends the run repeats it until it is read back;
 //  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms.
-//  Today
-//    the longest gap is only measured; the guard process that holds the port will act on it.
+//    Today the longest gap is only measured; the guard process that holds the port will act on it.
+//    A laser with a lease of its own (keep_alive) is told in the same tick, and no longer once off
+//    was sent: it goes off by itself when this thread hangs.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
