@@ -12,8 +12,6 @@
 #include <string.h>
 
 const char *const bench_axis_drivers[] = {"oriental-az", NULL};
-const char *const bench_laser_drivers[] = {"cobolt-05", NULL};
-const char *const bench_detector_drivers[] = {"sr830", NULL};
 static const char *const regimes[] = {"underfilled", "overfilled", NULL};
 static const char *const axis_names[] = {"theta_i", "theta_r", "sample", NULL};
 
@@ -85,7 +83,8 @@ static const struct cfg_row axis_rows[] = {
     {0}};
 
 static const struct cfg_row laser_rows[] = {
-    CHOICE(bench_config, "driver", laser.driver, bench_laser_drivers, NULL, "The kind of laser."),
+    TEXT(bench_config, "driver", laser.driver, NULL,
+         "The laser's profile: its name (\"cobolt-05\") or a path with a slash in it."),
     TEXT(bench_config, "link", laser.link, NULL,
          "\"serial:/dev/ttyUSB1?baud=115200\" or \"tcp:host:port\"."),
     REAL(bench_config, "power_w", laser.power_w, "W", 1e-6, 100, NULL, "The set-point."),
@@ -97,8 +96,8 @@ static const struct cfg_row laser_rows[] = {
     {0}};
 
 static const struct cfg_row detector_rows[] = {
-    CHOICE(bench_config, "driver", detector.driver, bench_detector_drivers, NULL,
-           "The kind of detector."),
+    TEXT(bench_config, "driver", detector.driver, NULL,
+         "The detector's profile: its name (\"sr830\") or a path with a slash in it."),
     TEXT(bench_config, "link", detector.link, NULL,
          "\"serial:/dev/ttyUSB2?baud=19200\" or \"tcp:host:port\"."),
     REAL(bench_config, "time_constant_s", detector.time_constant_s, "s", 1e-5, 300, NULL,

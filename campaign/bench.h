@@ -41,7 +41,7 @@ struct bench_axis {
 };
 
 struct bench_laser {
-    int driver; // index into bench_laser_drivers
+    char driver[BENCH_LINK]; // name or path of a profile, drivers/profile.h
     char link[BENCH_LINK];
     double power_w;
     double warmup_s;
@@ -49,7 +49,7 @@ struct bench_laser {
 };
 
 struct bench_detector {
-    int driver; // index into bench_detector_drivers
+    char driver[BENCH_LINK]; // likewise
     char link[BENCH_LINK];
     double time_constant_s;
     int slope_db;           // 6, 12, 18, 24 per octave
@@ -80,8 +80,7 @@ struct bench_config {
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides
 };
 
-extern const char *const bench_axis_drivers[], *const bench_laser_drivers[],
-                                                   *const bench_detector_drivers[];
+extern const char *const bench_axis_drivers[];
 extern const struct cfg_row bench_config_schema[];
 
 // As campaign_config_load and campaign_config_parse.

@@ -184,13 +184,20 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     return m->axis->ops->stop(m->axis, err);
 }
 
+static int need_profile(struct profile **profile, const char *name, struct gon_error *err)
+{
+    return *profile ? 0 : profile_open(name, NULL, profile, err);
+}
+
 static int connect_laser(struct instrument *in, struct gon_error *err)
 {
     struct part_state *p = &in->part[PART_LASER];
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = laser_cobolt_open(p->address, &in->breathing.clk, NULL, &laser, err);
+    int rc = need_profile(&in->laser_profile, in->bench->laser.driver, err);
+    if (rc == 0)
+        rc = laser_by_profile(in->laser_profile, p->address, &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
@@ -202,7 +209,8 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
 int instrument_write_set_up(struct instrument *in, struct gon_error *err)
 {
     const struct bench_detector *c = &in->bench->detector;
-    const struct detector_setup setup = {c->time_constant_s, c->slope_db, c->monitor_aux};
+    const struct detector_setup setup = {c->time_constant_s, c->slope_db, c->monitor_aux,
+                                         in->bench->wavelength_nm};
     in->range = -1;
     return in->detector->ops->setup(in->detector, &setup, &in->time_constant_s, err);
 }
@@ -210,9 +218,11 @@ int instrument_write_set_up(struct instrument *in, struct gon_error *err)
 static int connect_detector(struct instrument *in, struct gon_error *err)
 {
     struct part_state *p = &in->part[PART_DETECTOR];
-    int rc = in->detector
-                 ? in->detector->ops->reopen(in->detector, err)
-                 : detector_sr830_open(p->address, &in->breathing.clk, NULL, &in->detector, err);
+    int rc = in->detector ? in->detector->ops->reopen(in->detector, err)
+                          : need_profile(&in->detector_profile, in->bench->detector.driver, err);
+    if (rc >= 0 && !in->detector)
+        rc = detector_by_profile(in->detector_profile, p->address, &in->breathing.clk, NULL,
+                                 &in->detector, err);
     if (rc >= 0)
         rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
     return rc < 0 ? rc : instrument_write_set_up(in, err);
@@ -349,6 +359,8 @@ bool instrument_free(struct instrument *in)
         bus_close(in->bus[i]);
     if (in->detector)
         in->detector->ops->free(in->detector);
+    free(in->laser_profile);
+    free(in->detector_profile);
     free(in);
     return dark;
 }

@@ -37,6 +37,7 @@ struct instrument {
 
     struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];
+    struct profile *laser_profile, *detector_profile; // loaded when first needed; NULL before
     struct safety *safety;
     const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One detector chain: signal and, where wired, the reference monitor, read in one transaction; made
-// by by_profile.h. Opening one sends nothing: call identify and setup next. A value never travels without its flags; a reading that is not a number is an error, never a
-// number. The driver does I/O; averaging, ranging and settling rules live above (daemon/acquire.h).
-// Thread: instrument.
+// by by_profile.h. Opening one sends nothing: call identify and setup next. A value never travels
+// without its flags; a reading that is not a number is an error, never a number. The driver does
+// I/O; averaging, ranging and settling rules live above (daemon/acquire.h). Thread: instrument.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -22,7 +22,7 @@ enum detector_flag {
     DETECTOR_SATURATED = 1 << 0, // input, filter or output overload, or >= 0.95 of full scale
     DETECTOR_UNLOCKED = 1 << 1,  // reference lost
     DETECTOR_UNSETTLED = 1 << 2  // something changed the filter or the range, or the device
-                                // restarted: the settling time no longer holds; set it up again
+                                 // restarted: the settling time no longer holds; set it up again
 };
 
 struct detector_sample {
@@ -34,16 +34,16 @@ struct detector_sample {
 
 struct detector_setup {
     double time_constant_s;
-    int slope_db;    // 6, 12, 18, 24 per octave
-    int monitor_aux; // 1..4; 0: no monitor
+    int slope_db;         // 6, 12, 18, 24 per octave
+    int monitor_aux;      // 1..4; 0: no monitor
     double wavelength_nm; // of the light, for what is calibrated by it; 0: not known
 };
 
 struct detector_ops {
     int (*identify)(struct detector *d, char *ret_text, size_t size, struct gon_error *err);
     // Writes the settings as far as the device has them, and reads them back. The time constant is
-    // the shortest that is not below the one asked; ret_time_constant_s is what the device has then.
-    // Reserve, coupling, phase and reference stay as the operator set them.
+    // the shortest that is not below the one asked; ret_time_constant_s is what the device has
+    // then. Reserve, coupling, phase and reference stay as the operator set them.
     int (*setup)(struct detector *d, const struct detector_setup *s, double *ret_time_constant_s,
                  struct gon_error *err);
     int (*ranges)(struct detector *d); // how many; range 0 is the most sensitive

@@ -19,14 +19,14 @@ struct profiled_detector {
     struct detector detector; // first
     struct session *s;
     const struct profile_detector *is;
-    struct detector_setup setup;         // as it was set up last
-    double full_scale[PROFILE_LADDER];   // from the most sensitive one
+    struct detector_setup setup;       // as it was set up last
+    double full_scale[PROFILE_LADDER]; // from the most sensitive one
     int ranges;
-    int range;                           // as it was set; -1: not known
-    int64_t ready_ns;                    // after a change of range
-    unsigned turn;                       // of the ways to ask for a sample
-    unsigned flags;                      // of samples since the last condition
-    bool restarted;                      // since the last setup
+    int range;        // as it was set; -1: not known
+    int64_t ready_ns; // after a change of range
+    unsigned turn;    // of the ways to ask for a sample
+    unsigned flags;   // of samples since the last condition
+    bool restarted;   // since the last setup
 };
 
 static struct profiled_detector *detector_of(struct detector *d)

@@ -18,27 +18,28 @@ struct laser;
 
 enum laser_state {
     LASER_OFF,
-    LASER_WARMING,       // on its way: temperatures, delay by regulation
-    LASER_EMITTING,      // at its set-point
-    LASER_INTERLOCK,     // open
-    LASER_NEEDS_KEY,     // an operator must cycle the key
+    LASER_WARMING,   // on its way: temperatures, delay by regulation
+    LASER_EMITTING,  // at its set-point
+    LASER_INTERLOCK, // open
+    LASER_NEEDS_KEY, // an operator must cycle the key
     LASER_FAULT
 };
 
 struct laser_status {
     enum laser_state state;
-    bool emission;       // the laser says that light comes out, or may at any moment
+    bool emission; // the laser says that light comes out, or may at any moment
     bool interlock_closed;
-    double power_w;      // as the laser measures it; NAN when it does not
+    double power_w; // as the laser measures it; NAN when it does not
     double setpoint_w;
-    int fault_code;      // 0: none
+    int fault_code; // 0: none
 };
 
 struct laser_ops {
     int (*identify)(struct laser *l, char *ret_text, size_t size, struct gon_error *err);
     // Everything, asked now. Cobolt: 5 commands (6 the first time), 0.1 s each.
     int (*status)(struct laser *l, struct laser_status *ret_status, struct gon_error *err);
-    // As few commands as possible (Cobolt: one, 0.1 s): whether the laser says that light comes out.
+    // As few commands as possible (Cobolt: one, 0.1 s): whether the laser says that light comes
+    // out.
     int (*emission)(struct laser *l, bool *ret_emission, struct gon_error *err);
     int (*set_power)(struct laser *l, double power_w, struct gon_error *err); // read back
     // GON_E_REFUSED: interlock open, key; GON_E_DEVICE: fault, or it does not want to.
@@ -47,8 +48,8 @@ struct laser_ops {
     // GON_E_DEVICE: told 6 times and it still emits ("LASER MAY BE ON"). Cobolt: sent at once,
     // confirmed 0.35 s later.
     int (*off)(struct laser *l, struct gon_error *err);
-    // Renews the lease that the laser itself gives, when that is due; called while emission is on by
-    // whoever renews ours, at least every 200 ms, and never else. NULL: the laser gives none.
+    // Renews the lease that the laser itself gives, when that is due; called while emission is on
+    // by whoever renews ours, at least every 200 ms, and never else. NULL: the laser gives none.
     int (*keep_alive)(struct laser *l, struct gon_error *err);
     int (*reopen)(struct laser *l, struct gon_error *err);
     const char *(*fault_text)(struct laser *l, int code);

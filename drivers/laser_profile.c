@@ -324,7 +324,8 @@ int laser_by_profile(const struct profile *p, const char *link, struct clk *clk,
         session_free(s);
         return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
     }
-    *z = (struct profiled_laser){.laser = {&ops}, .s = s, .is = &p->laser, .alive_ns = INT64_MIN / 2};
+    *z = (struct profiled_laser){
+        .laser = {&ops}, .s = s, .is = &p->laser, .alive_ns = INT64_MIN / 2};
     *ret_laser = &z->laser;
     return 0;
 }

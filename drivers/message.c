@@ -138,8 +138,9 @@ struct span {
 static char *find_end(struct message *m, size_t from)
 {
     size_t length = strlen(m->format->end_in);
-    return m->have < from + length ? NULL
-                                   : memmem(m->in + from, m->have - from, m->format->end_in, length);
+    return m->have < from + length
+               ? NULL
+               : memmem(m->in + from, m->have - from, m->format->end_in, length);
 }
 
 // Reads on until the line that begins at from is complete.
@@ -204,8 +205,8 @@ static bool stands_alone(const struct message *m, const struct span *s)
 }
 
 // The line that says OK: instead of an answer, or behind it.
-static int take_ok(struct message *m, const char *command, int64_t deadline_ns,
-                   struct span *answer, size_t *ret_used, struct gon_error *err)
+static int take_ok(struct message *m, const char *command, int64_t deadline_ns, struct span *answer,
+                   size_t *ret_used, struct gon_error *err)
 {
     const size_t end_size = strlen(m->format->end_in);
     struct span line = *answer;
@@ -236,8 +237,8 @@ static int cut_echo(struct message *m, const char *command, struct span *answer,
     const char *text = m->in + answer->begin;
     const size_t size = answer->end - answer->begin;
     if (size < length || memcmp(text, command, length) != 0 ||
-        (size > length && (size < length + end_size ||
-                           memcmp(text + length, m->format->echo_end, end_size) != 0)))
+        (size > length &&
+         (size < length + end_size || memcmp(text + length, m->format->echo_end, end_size) != 0)))
         return garbled(m, command, "the device does not repeat the command", answer->end, err);
     answer->begin += size > length ? length + end_size : length;
     return 0;

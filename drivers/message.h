@@ -18,12 +18,12 @@ struct message;
 struct profile_checksum;
 
 struct message_format {
-    const char *end_out;    // appended to what is sent: "\r"
-    const char *end_in;     // ends an answer: "\r\n"; the bytes before it, without blanks around
-    int64_t min_gap_ns;     // from an answer to the next command; 20 ms more when unanswered
-    int64_t timeout_ns;     // for one answer, from the last byte sent
-    int64_t quiet_ns;       // silence after which nothing more comes: the largest latency
-    const char *sync_query; // asked to get into step, with an answer of
+    const char *end_out;     // appended to what is sent: "\r"
+    const char *end_in;      // ends an answer: "\r\n"; the bytes before it, without blanks around
+    int64_t min_gap_ns;      // from an answer to the next command; 20 ms more when unanswered
+    int64_t timeout_ns;      // for one answer, from the last byte sent
+    int64_t quiet_ns;        // silence after which nothing more comes: the largest latency
+    const char *sync_query;  // asked to get into step, with an answer of
     const char *sync_begins; // this beginning; NULL query: draining is all
     const char *echo_end;    // the device repeats the command, then this, then the answer: is
                              // checked and cut off. NULL or "": it must not repeat anything
@@ -38,10 +38,10 @@ struct message_format {
 struct message *message_new(struct transport *t, const struct message_format *format);
 void message_free(struct message *m); // closes the transport
 
-// Sends and returns the answer without its terminator, echo, ok_line and checksum; where there is an
-// echo or ok_line it may be empty. GON_E_LINK: no or no usable answer (the link
-// resynchronises by itself before the next query); GON_E_GONE: unplugged; GON_E_DEVICE: the device
-// sends back what it is told (echo). The text then names the query.
+// Sends and returns the answer without its terminator, echo, ok_line and checksum; where there is
+// an echo or ok_line it may be empty. GON_E_LINK: no or no usable answer (the link resynchronises
+// by itself before the next query); GON_E_GONE: unplugged; GON_E_DEVICE: the device sends back what
+// it is told (echo). The text then names the query.
 int message_query(struct message *m, const char *command, char *ret_answer, size_t size,
                   struct gon_error *err);
 // Expects no answer.

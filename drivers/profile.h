@@ -403,6 +403,10 @@ int profile_parse(const char *text, const char *name, struct cfg_sink sink,
 int profile_find(const char *name, const char *folder, char *ret_path, size_t size,
                  struct gon_error *err);
 
+// Found and loaded; the error says the first mistake. folder may be NULL.
+int profile_open(const char *name, const char *folder, struct profile **ret_profile,
+                 struct gon_error *err);
+
 int profile_value(const struct profile *p, const char *name);    // index, or -1
 int profile_exchange(const struct profile *p, const char *name); // index, or -1
 int profile_write(const struct profile *p, const char *name);    // index, or -1

@@ -77,8 +77,8 @@ static int64_t now_ns(const struct profiled_selector *z)
     return clk_now_ns(transport_clk(transport_of(z)));
 }
 
-// Looks until it stands at that position, or at any with SELECTOR_ELSEWHERE. ret_there: where it was
-// seen last.
+// Looks until it stands at that position, or at any with SELECTOR_ELSEWHERE. ret_there: where it
+// was seen last.
 static int wait_there(struct profiled_selector *z, int position, int *ret_there,
                       struct gon_error *err)
 {
@@ -102,7 +102,8 @@ static int wait_there(struct profiled_selector *z, int position, int *ret_there,
 static int elsewhere(struct profiled_selector *z, int wanted, int there, struct gon_error *err)
 {
     const bool nowhere = there == SELECTOR_ELSEWHERE;
-    return gon_fail(err, GON_E_DEVICE, "%s: does not go to '%s' in %g s, it is %s%s%s; is it stuck?",
+    return gon_fail(err, GON_E_DEVICE,
+                    "%s: does not go to '%s' in %g s, it is %s%s%s; is it stuck?",
                     session_link(z->s), z->is->positions[wanted].name, z->is->timeout_s,
                     nowhere ? "at none of its positions" : "at '",
                     nowhere ? "" : z->is->positions[there].name, nowhere ? "" : "'");
@@ -172,8 +173,10 @@ static int check_profile(const struct profile *p, struct gon_error *err)
     if (p->role != PROFILE_SELECTOR)
         return gon_fail(err, GON_E_INPUT, "profile %s is not of a selector", p->name);
     if (p->selector.positions_count == 0 || p->selector.status.count == 0)
-        return gon_fail(err, GON_E_INPUT, "profile %s does not say where it can be, and how that "
-                        "is seen", p->name);
+        return gon_fail(err, GON_E_INPUT,
+                        "profile %s does not say where it can be, and how that "
+                        "is seen",
+                        p->name);
     return 0;
 }
 

@@ -183,8 +183,8 @@ static int exchange_when_free(struct text_session *t, const struct profile_excha
                               struct gon_error *err)
 {
     int rc = exchange(t, x, err);
-    for (int i = 0;
-         i < BUSY_TRIES && rc == GON_E_REFUSED && t->session.meaning == PROFILE_BUSY; i++) {
+    for (int i = 0; i < BUSY_TRIES && rc == GON_E_REFUSED && t->session.meaning == PROFILE_BUSY;
+         i++) {
         rc = pause_ns(t, BUSY_NS, err);
         if (rc == 0)
             rc = exchange(t, x, err);

@@ -287,8 +287,9 @@ static inline int simbench_laser_reopen(struct laser *l, struct gon_error *err)
     return simbench_call(simbench_of_laser(l), SIMBENCH_LASER, &done, err);
 }
 
-static inline const char *simbench_fault_text(int code)
+static inline const char *simbench_fault_text(struct laser *l, int code)
 {
+    (void)l;
     return code == 3 ? "interlock" : "";
 }
 

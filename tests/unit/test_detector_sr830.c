@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // uses: drivers sim model base
-// The SR830 driver against the simulated instrument, in virtual time.
+// The profile of an SR830 against the simulated instrument, in virtual time.
 #include "drivers/detector.h"
 
+#include "drivers/by_profile.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
+#include "tests/unit/profiles.h"
 #include "tests/unit/vline.h"
 
 #include <math.h>
@@ -27,7 +29,7 @@ static struct detector *open_on(struct port *port)
     struct clk *clk = vline_begin(port);
     char link[128];
     snprintf(link, sizeof link, "%s?baud=9600", vline.link);
-    if (detector_sr830_open(link, clk, NULL, &d, &err) < 0)
+    if (detector_by_profile(profiles_get("sr830"), link, clk, NULL, &d, &err) < 0)
         fail_msg("%s", err.text);
     return d;
 }
@@ -104,9 +106,9 @@ static void the_time_constant_is_the_next_that_is_not_shorter(void **state)
 
 static void impossible_settings_are_refused(void **state)
 {
-    static const struct detector_setup bad[] = {{30001, 12, 1}, {0, 12, 1},   {-1, 12, 1},
-                                                {0.1, 13, 1},   {0.1, 0, 1},  {0.1, 30, 1},
-                                                {0.1, 12, 5},   {0.1, 12, -1}};
+    static const struct detector_setup bad[] = {{30001, 12, 1, 0}, {0, 12, 1, 0},   {-1, 12, 1, 0},
+                                                {0.1, 13, 1, 0},   {0.1, 0, 1, 0},  {0.1, 30, 1, 0},
+                                                {0.1, 12, 5, 0},   {0.1, 12, -1, 0}};
     struct gon_error err;
     (void)state;
     struct detector *d = begin_ready(26);
@@ -153,10 +155,11 @@ static void a_setting_that_does_not_take_is_an_error(void **state)
     scripted_init(&s, "\r", hear_stubborn);
     struct detector *d = open_on(&s.port);
     assert_int_equal(d->ops->set_range(d, 20, &err), GON_E_DEVICE);
-    assert_non_null(strstr(err.text, "refuses SENS 20 (it reads back 26, *ESR? is 0)"));
+    assert_non_null(
+        strstr(err.text, "refuses 'SENS 20;SENS?' (full_scale reads back 1 V, esr is 0)"));
     s.step = 1; // reads back as told, but complains
     assert_int_equal(d->ops->set_range(d, 26, &err), GON_E_DEVICE);
-    assert_non_null(strstr(err.text, "refuses SENS 26 (it reads back 26, *ESR? is 16)"));
+    assert_non_null(strstr(err.text, "refuses 'SENS 26;SENS?' (esr is 16 (bad parameter))"));
     d->ops->free(d);
 }
 
@@ -202,9 +205,16 @@ static void what_is_no_reading_never_becomes_one(void **state)
         "0.001\r",                  // one number
         "0.001,1000\r",             // no frequency or no monitor, depending on the question
         "0.001,1000,0.5,0.1,0.1\r", // too many
-        "nan,1000,0.5\r",  "OVLD,1000,0.5\r", "9.9e37,1000,0.5\r", "0,001,1000,0,5\r",
-        "0.5,1000,0.5\r",      // range 20 is 10 mV: impossible
-        "0.001,-5,0.5\r",      "0.001,200000,0.5\r",  "0.001,1000,99\r", ",,\r", "\r"};
+        "nan,1000,0.5\r",
+        "OVLD,1000,0.5\r",
+        "9.9e37,1000,0.5\r",
+        "0,001,1000,0,5\r",
+        "0.5,1000,0.5\r", // range 20 is 10 mV: impossible
+        "0.001,-5,0.5\r",
+        "0.001,200000,0.5\r",
+        "0.001,1000,99\r",
+        ",,\r",
+        "\r"};
     (void)state;
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct scripted s;

@@ -201,10 +201,17 @@ static void a_bench_without_a_sample_stage_has_none(void **state)
 }
 
 // Real drivers, ports that do not exist: the daemon starts nevertheless and says what is missing.
+static void use_profiles(struct bench_config *bench)
+{
+    snprintf(bench->laser.driver, sizeof bench->laser.driver, "configs/profiles/cobolt-05.cfg");
+    snprintf(bench->detector.driver, sizeof bench->detector.driver, "configs/profiles/sr830.cfg");
+}
+
 static void ports_that_are_not_there_do_not_stop_the_daemon(void **state)
 {
     (void)state;
     struct setting *s = begin();
+    use_profiles(&s->bench);
     s->bench.buses_count = 1;
     snprintf(s->bench.buses[0].name, sizeof s->bench.buses[0].name, "axes");
     snprintf(s->bench.buses[0].link, sizeof s->bench.buses[0].link,
@@ -236,12 +243,27 @@ static void a_link_that_is_no_link_is_an_error_of_the_bench(void **state)
     (void)state;
     struct setting *s = begin();
     struct gon_error err;
+    use_profiles(&s->bench);
     s->bench.axes_count = 0;
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "carrier-pigeon:laser");
     snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/detector");
     assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "laser: "));
     assert_null(s->in);
+    free(s);
+}
+
+static void a_profile_that_is_not_there_is_an_error_of_the_bench(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    struct gon_error err;
+    use_profiles(&s->bench);
+    s->bench.axes_count = 0;
+    snprintf(s->bench.laser.driver, sizeof s->bench.laser.driver, "cobolt-99");
+    snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "serial:/nowhere/laser");
+    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "no profile 'cobolt-99': looked for "));
     free(s);
 }
 
@@ -258,6 +280,7 @@ int main(void)
         cmocka_unit_test(a_bench_without_a_sample_stage_has_none),
         cmocka_unit_test(ports_that_are_not_there_do_not_stop_the_daemon),
         cmocka_unit_test(a_link_that_is_no_link_is_an_error_of_the_bench),
+        cmocka_unit_test(a_profile_that_is_not_there_is_an_error_of_the_bench),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

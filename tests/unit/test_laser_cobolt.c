@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // uses: drivers sim model base
-// The Cobolt driver against the simulated laser, in virtual time.
+// The profile of a Cobolt laser against the simulated laser, in virtual time.
 #include "drivers/laser.h"
 
+#include "drivers/by_profile.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
+#include "tests/unit/profiles.h"
 #include "tests/unit/vline.h"
 
 #include <math.h>
@@ -24,7 +26,7 @@ static struct laser *open_on(struct port *port, const struct cancel *cancel)
     struct laser *l;
     struct gon_error err;
     struct clk *clk = vline_begin(port);
-    if (laser_cobolt_open(vline.link, clk, cancel, &l, &err) < 0)
+    if (laser_by_profile(profiles_get("cobolt-05"), vline.link, clk, cancel, &l, &err) < 0)
         fail_msg("%s", err.text);
     return l;
 }
@@ -107,7 +109,7 @@ static void another_laser_is_refused(void **state)
     scripted_init(&s, "\r", hear_stranger);
     l = open_on(&s.port, NULL);
     assert_int_equal(l->ops->identify(l, text, sizeof text, &err), GON_E_DEVICE);
-    assert_non_null(strstr(err.text, "is it a Cobolt laser?"));
+    assert_non_null(strstr(err.text, "is it a Cobolt 05-01 laser?"));
     l->ops->free(l);
 }
 
@@ -376,7 +378,7 @@ static void a_fault_has_its_code_and_refuses_on(void **state)
     assert_true(s.state == LASER_FAULT && s.fault_code == 1);
     assert_int_equal(l->ops->on(l, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "fault 1 (temperature)"));
-    assert_string_equal(l->ops->fault_text(4), "constant power not reached in time");
+    assert_string_equal(l->ops->fault_text(l, 4), "constant power not reached in time");
     l->ops->free(l);
 }
 
