@@ -56,7 +56,13 @@ enum profile_role {
 // --- values --------------------------------------------------------------------------------------
 
 enum profile_type { PROFILE_REAL, PROFILE_INT, PROFILE_HEX, PROFILE_STRING, PROFILE_WORD };
-enum profile_table { PROFILE_HOLDING, PROFILE_INPUT, PROFILE_COIL, PROFILE_DISCRETE };
+enum profile_table {
+    PROFILE_HOLDING,
+    PROFILE_INPUT,
+    PROFILE_COIL,
+    PROFILE_DISCRETE,
+    PROFILE_NO_TABLE // has no register: what only the simulated instrument knows
+};
 enum profile_format { // of a register, in 16-bit words
     PROFILE_U16,
     PROFILE_S16,
@@ -142,8 +148,7 @@ struct profile_exchange {
     double settle_ms;          // after a setting, before it is verified
     double timeout_ms;         // 0: as framing
     bool check;                // ask for errors afterwards
-    char
-        then[PROFILE_TEXT]; // what it changes in the simulated instrument: "emission = 1, mode = 4"
+    char then[PROFILE_TEXT];   // what it changes in the simulated instrument
     char help[PROFILE_TEXT];
 };
 
@@ -332,6 +337,10 @@ struct profile_inputs {
 };
 
 // --- the simulated instrument --------------------------------------------------------------------
+// What exchanges, writes, drifts and refusals change ("then") are assignments with commas between:
+//   emission = 1   mode = warming   output.moving = 0 (one bit)   target = position (as another
+//   value is now)   open = not open (0 becomes 1, others 0)
+// They follow the answer: a register that is cleared by reading is answered as it was.
 
 struct profile_start { // what a value is when the power comes on
     char value[PROFILE_NAME];
@@ -346,11 +355,21 @@ struct profile_drift {
     char then[PROFILE_TEXT];       // once it is there
 };
 
+// What it does not do, first row that fits. does: an exchange or write; "": every command that is
+// not known or has a number beyond its range.
+struct profile_deny {
+    char does[PROFILE_NAME], when[PROFILE_TEXT];
+    char answer[PROFILE_TEXT]; // pattern; "": silence. Modbus: the exception's number
+    char then[PROFILE_TEXT];   // an error register's bit
+};
+
 struct profile_simulate {
     struct profile_start start[PROFILE_VALUES];
     int start_count;
     struct profile_drift drift[PROFILE_STEPS];
     int drift_count;
+    struct profile_deny deny[PROFILE_STEPS];
+    int deny_count;
     double reply_ms;
 };
 

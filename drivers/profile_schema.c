@@ -13,7 +13,7 @@ const char *const profile_meanings[] = {"refused", "busy", "interlock", "key",
                                         "fault",   "fine", NULL};
 static const char *const protocols[] = {"message", "modbus", NULL};
 static const char *const types[] = {"real", "int", "hex", "string", "word", NULL};
-static const char *const tables[] = {"holding", "input", "coil", "discrete", NULL};
+static const char *const tables[] = {"holding", "input", "coil", "discrete", "none", NULL};
 static const char *const formats[] = {"u16", "s16", "u32", "s32", "f32", NULL};
 static const char *const orders[] = {"high-first", "low-first", NULL};
 static const char *const own_orders[] = {"as-registers", "high-first", "low-first", NULL};
@@ -124,7 +124,8 @@ static const struct cfg_row value_rows[] = {
     GROUPS(profile_value, "bits", bits, bits_count, bit_rows, "Names of its bits."),
     TEXT(profile_value, "valid", valid, "", "Condition without which it means nothing."),
     TEXT(profile_value, "help", help, "", "What it is."),
-    CHOICE(profile_value, "table", table, tables, "\"holding\"", "Modbus: which table."),
+    CHOICE(profile_value, "table", table, tables, "\"holding\"",
+           "Modbus: which table; none: what only the simulated instrument knows."),
     HEX(profile_value, "address", address, 0, 165535, "0",
         "Modbus: its (first) register as the manual counts."),
     CHOICE(profile_value, "format", format, formats, "\"u16\"", "Modbus: how registers hold it."),
@@ -408,9 +409,19 @@ static const struct cfg_row drift_rows[] = {
     TEXT(profile_drift, "then", then, "", "What it changes once it is there."),
     {0}};
 
+static const struct cfg_row deny_rows[] = {
+    TEXT(profile_deny, "does", does, "",
+         "Exchange or write; without one: what is not known or beyond its range."),
+    TEXT(profile_deny, "when", when, "", "Condition."),
+    BYTES(profile_deny, "answer", answer, "",
+          "What it says instead: a pattern; without one nothing. Modbus: the exception's number."),
+    TEXT(profile_deny, "then", then, "", "What it changes."),
+    {0}};
+
 static const struct cfg_row simulate_rows[] = {
     GROUPS(profile_simulate, "start", start, start_count, start_rows, "When the power comes on."),
     GROUPS(profile_simulate, "drift", drift, drift_count, drift_rows, "What goes by itself."),
+    GROUPS(profile_simulate, "deny", deny, deny_count, deny_rows, "What it refuses."),
     REAL(profile_simulate, "reply_ms", reply_ms, "ms", 0, 5000, "2", "Its time to answer."),
     {0}};
 
