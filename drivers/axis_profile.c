@@ -117,13 +117,13 @@ static int move_abs(struct axis *a, int32_t position_steps, int32_t speed_steps_
                     int32_t acceleration_steps_per_s2, struct gon_error *err)
 {
     struct profiled_axis *z = axis_of(a);
-    if (speed_steps_per_s < 1 || speed_steps_per_s > z->is->speed_most ||
+    if (speed_steps_per_s < z->is->speed_least || speed_steps_per_s > z->is->speed_most ||
         acceleration_steps_per_s2 < 1 || acceleration_steps_per_s2 > z->is->acceleration_most)
         return gon_fail(
             err, GON_E_INPUT,
-            "unit %d: %ld steps/s, %ld steps/s2; allowed: 1..%.0f steps/s, 1..%.0f steps/s2",
-            z->unit, (long)speed_steps_per_s, (long)acceleration_steps_per_s2, z->is->speed_most,
-            z->is->acceleration_most);
+            "unit %d: %ld steps/s, %ld steps/s2; allowed: %.0f..%.0f steps/s, 1..%.0f steps/s2",
+            z->unit, (long)speed_steps_per_s, (long)acceleration_steps_per_s2, z->is->speed_least,
+            z->is->speed_most, z->is->acceleration_most);
     const struct profile_param params[] = {{"position", position_steps},
                                            {"speed", speed_steps_per_s},
                                            {"acceleration", acceleration_steps_per_s2},

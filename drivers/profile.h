@@ -288,7 +288,7 @@ struct profile_detector {
     struct profile_asks read_range;
     char set_range[PROFILE_NAME];
     double range_settle_ms; // after a change of range nothing is believed so long
-    double settle_s; // of the instrument, where it has no time constant: taken for one
+    double settle_s;        // of the instrument, where it has no time constant: taken for one
     // What is asked for one sample. The two are taken in turn, so that a late answer does not fit.
     struct profile_asks sample, sample_monitor; // the second with monitor_aux > 0
     char signal[PROFILE_NAME], monitor[PROFILE_NAME], reference[PROFILE_NAME]; // values
@@ -304,9 +304,9 @@ struct profile_axis {
         alarm[PROFILE_TEXT], limit[PROFILE_TEXT]; // conditions
     // move is given $position, $speed, $acceleration (steps, steps/s, steps/s2); sent once
     char move[PROFILE_NAME], stop[PROFILE_NAME], home[PROFILE_NAME], reset[PROFILE_NAME],
-        enable[PROFILE_NAME], clear[PROFILE_NAME]; // clear: takes back command bits left set
-    double speed_most, acceleration_most;          // steps/s, steps/s2
-    char following[PROFILE_TEXT];                  // condition: a following error
+        enable[PROFILE_NAME], clear[PROFILE_NAME];     // clear: takes back command bits left set
+    double speed_least, speed_most, acceleration_most; // steps/s, steps/s2
+    char following[PROFILE_TEXT];                      // condition: a following error
     struct profile_code alarms[PROFILE_CODES];
     int alarms_count;
     char watchdog[PROFILE_NAME]; // write; "": none

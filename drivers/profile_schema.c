@@ -361,6 +361,7 @@ static const struct cfg_row axis_rows[] = {
     TEXT(profile_axis, "reset", reset, "", "The write that clears an alarm."),
     TEXT(profile_axis, "enable", enable, "", "The write that switches the motor's current on."),
     TEXT(profile_axis, "clear", clear, "", "The write that takes back command bits left set."),
+    REAL(profile_axis, "speed_least", speed_least, "steps/s", 1, 1e9, "1", "The least."),
     REAL(profile_axis, "speed_most", speed_most, "steps/s", 1, 1e12, "1000000", "The most."),
     REAL(profile_axis, "acceleration_most", acceleration_most, "steps/s2", 1, 1e12, "1000000000",
          "The most."),
