@@ -5,9 +5,9 @@
 
 #include "drivers/bus.h"
 #include "drivers/by_profile.h"
-#include "drivers/profile.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
+#include "tests/unit/profiles.h"
 #include "tests/unit/vline.h"
 
 #include <setjmp.h>
@@ -26,7 +26,7 @@ static struct {
     int frames;
 } tap;
 static struct bus *bus;
-static struct profile *az;
+static const struct profile *az;
 
 static void feed_tapped(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)
 {
@@ -315,28 +315,9 @@ static void no_wrong_position_under_faults(void **state)
     end(a);
 }
 
-static void say(void *ctx, const char *line)
-{
-    (void)ctx;
-    print_error("%s\n", line);
-}
-
-static int load_profile(void **state)
-{
-    (void)state;
-    return profile_load("configs/profiles/oriental-az.cfg", (struct cfg_sink){say, NULL}, &az,
-                        NULL);
-}
-
-static int free_profile(void **state)
-{
-    (void)state;
-    free(az);
-    return 0;
-}
-
 int main(void)
 {
+    az = profiles_get("oriental-az");
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(frames_are_those_of_the_register_map),
         cmocka_unit_test(a_move_arrives_and_says_so),
@@ -351,5 +332,5 @@ int main(void)
         cmocka_unit_test(another_kind_of_unit_is_refused_and_not_written_to),
         cmocka_unit_test(no_wrong_position_under_faults),
     };
-    return cmocka_run_group_tests(tests, load_profile, free_profile);
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }
