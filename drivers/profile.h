@@ -104,12 +104,12 @@ struct profile_value {
     char valid[PROFILE_TEXT]; // condition: where it does not hold the value is unknown
     char help[PROFILE_TEXT];
     // Modbus
-    int table;        // enum profile_table
-    uint32_t address; // as the manual counts it; registers.base is subtracted
-    int format;       // enum profile_format
-    int word_order;   // 0: as registers.word_order; else 1 + enum profile_order
-    int access;       // enum profile_access
-    bool alone;       // never read in a block with its neighbours
+    int table;                 // enum profile_table
+    uint32_t address;          // as the manual counts it; registers.base is subtracted
+    int format;                // enum profile_format
+    int word_order;            // 0: as registers.word_order; else 1 + enum profile_order
+    int access;                // enum profile_access
+    bool alone;                // never read in a block with its neighbours
     char shares[PROFILE_NAME]; // lies in registers of that other value, and is meant to; "": none
 };
 
@@ -195,7 +195,8 @@ struct profile_registers {
 
 struct profile_write {
     char name[PROFILE_NAME];
-    char set[PROFILE_ITEMS][PROFILE_TEXT]; // "speed = $speed", "type = 1"; one transaction
+    // "speed = $speed", "type = 1", a name alone as it is known; all in one transaction
+    char set[PROFILE_ITEMS][PROFILE_TEXT];
     int set_count;
     char edge[PROFILE_TEXT];    // "input.stop": set and taken back; instead of set
     char release[PROFILE_NAME]; // the write that takes it back; "": the value is written as 0

@@ -233,7 +233,8 @@ static const struct cfg_row register_rows[] = {
 static const struct cfg_row write_rows[] = {
     TEXT(profile_write, "name", name, NULL, "What the roles call it."),
     TEXTS(profile_write, "set", set, set_count,
-          "Values and what they become (\"speed = $speed\"), in one transaction."),
+          "Values and what they become (\"speed = $speed\"), in one transaction; a name alone: "
+          "what it was set to."),
     TEXT(profile_write, "edge", edge, "",
          "Instead: a bit (VALUE.BIT) that acts when it is set and is taken back."),
     TEXT(profile_write, "release", release, "",

@@ -27,13 +27,13 @@ static const char text[] =
     "  { name = \"mode\"; type = \"word\"; words = ( \"idle\", \"counting\" ); address = 12; },\n"
     "  { name = \"input\"; type = \"hex\"; format = \"u32\"; address = 20; access = \"w\";"
     "    bits = ( { name = \"go\"; bit = 0; }, { name = \"stop\"; bit = 1; } ); },\n"
-    "  { name = \"input_low\"; type = \"hex\"; address = 21; access = \"w\"; },\n"
+    "  { name = \"input_low\"; type = \"hex\"; address = 21; access = \"w\"; shares = \"input\"; "
+    "},\n"
     "  { name = \"hours\"; type = \"int\"; address = 40; access = \"r\"; },\n"
     "  { name = \"went\"; type = \"int\"; address = 50; access = \"r\"; }\n"
     ");\n"
     "writes: (\n"
-    "  { name = \"set_level\"; set = \"level = $level\"; readback = true; },\n"
-    "  { name = \"set_known\"; set = \"level\"; },\n"
+    "  { name = \"set_level\"; set = \"level\"; readback = true; },\n"
     "  { name = \"set_mode\"; set = \"mode = counting\"; verify = \"mode = counting\"; },\n"
     "  { name = \"go\"; edge = \"input.go\"; release = \"let_go\"; then = \"went = 1\"; },\n"
     "  { name = \"stop\"; edge = \"input.stop\"; release = \"let_go\"; repeat = true;"
@@ -116,7 +116,11 @@ static double now(const char *name)
     return actor.now.number[profile_value(profile, name)];
 }
 
-static const struct profile_param level[] = {{"level", 2.5}, {NULL, 0}};
+static int set_level(struct session *s, double level_v, struct gon_error *err)
+{
+    session_put(s, "level", level_v);
+    return session_send(s, "set_level", NULL, err);
+}
 
 // --- asking --------------------------------------------------------------------------------------
 
@@ -196,7 +200,7 @@ static void what_was_set_is_read_back(void **state)
     struct gon_error err;
     (void)state;
     struct session *s = begin();
-    assert_int_equal(session_send(s, "set_level", level, &err), 0);
+    assert_int_equal(set_level(s, 2.5, &err), 0);
     assert_true(now("level") == 2.5);
     assert_true(session_number(s, "level") == 2.5);
     assert_int_equal(writes.count, 1);
@@ -209,7 +213,7 @@ static void another_value_read_back_is_a_refusal(void **state)
     (void)state;
     struct session *s = begin();
     writes.stuck = 2;
-    assert_int_equal(session_send(s, "set_level", level, &err), GON_E_DEVICE);
+    assert_int_equal(set_level(s, 2.5, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "level was set to 2.5 V and reads back as 1.25"));
     assert_int_equal(session_meaning(s), PROFILE_REFUSED);
     writes.stuck = 12;
@@ -224,12 +228,11 @@ static void a_lost_answer_is_made_up_for_by_the_read_back(void **state)
     (void)state;
     struct session *s = begin();
     slaves.port.drop = 1;
-    assert_int_equal(session_send(s, "set_level", level, &err), 0);
+    assert_int_equal(set_level(s, 2.5, &err), 0);
     assert_int_equal(writes.count, 1); // and not sent again
     writes.stuck = 2;
     slaves.port.drop = 1;
-    const struct profile_param other[] = {{"level", 3}, {NULL, 0}};
-    assert_int_equal(session_send(s, "set_level", other, &err), GON_E_LINK);
+    assert_int_equal(set_level(s, 3, &err), GON_E_LINK);
     assert_non_null(strstr(err.text, "may have been carried out"));
     end(s);
 }
@@ -239,14 +242,12 @@ static void nothing_is_sent_beyond_the_range(void **state)
     struct gon_error err;
     (void)state;
     struct session *s = begin();
-    const struct profile_param high[] = {{"level", 11}, {NULL, 0}};
-    assert_int_equal(session_send(s, "set_level", high, &err), GON_E_INPUT);
+    assert_int_equal(set_level(s, 11, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "unit 5: set_level: level = 11 V; allowed: 0..10"));
-    assert_int_equal(session_send(s, "set_known", NULL, &err), GON_E_INPUT);
+    session_data(s)->known[profile_value(profile, "level")] = false;
+    assert_int_equal(session_send(s, "set_level", NULL, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "level is not known"));
     assert_int_equal(bus_stats(bus)->requests, 0);
-    session_put(s, "level", 4);
-    assert_int_equal(session_send(s, "set_known", NULL, &err), 0);
-    assert_true(now("level") == 4);
     end(s);
 }
 
@@ -334,11 +335,11 @@ static void a_bit_left_set_is_cleared_before_the_next_write(void **state)
     slaves.port.mute = false;
     set("input = 2, went = 0"); // as if only the setting had arrived
     writes.count = 0;
-    assert_int_equal(session_send(s, "set_level", level, &err), 0);
+    assert_int_equal(set_level(s, 2.5, &err), 0);
     check_write(0, 21, 1, 0);
     check_write(1, 2, 1, 250);
     writes.count = 0;
-    assert_int_equal(session_send(s, "set_level", level, &err), 0);
+    assert_int_equal(set_level(s, 2.5, &err), 0);
     assert_int_equal(writes.count, 1);
     end(s);
 }
