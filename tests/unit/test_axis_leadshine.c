@@ -5,7 +5,7 @@
 #include "drivers/blocks.h"
 #include "drivers/bus.h"
 #include "drivers/by_profile.h"
-#include "drivers/golden_bus.h"
+#include "drivers/session.h"
 #include "sim/leadshine.h"
 #include "sim/modbus.h"
 #include "tests/unit/noisy.h"
@@ -108,13 +108,22 @@ static void check_frame(int i, const uint8_t *bytes, size_t size)
     assert_memory_equal(tap.frame[i], bytes, size);
 }
 
+// The manual's example, CRC included. The drive of the example has the address 7.
 static void the_manuals_frame_is_the_profiles(void **state)
 {
-    struct gon_error err;
+    const uint8_t shown[] = {0x07, 0x10, 0x62, 0x00, 0x00, 0x08, 0x10, 0x00, 0x01,
+                             0x00, 0x00, 0x27, 0x10, 0x00, 0x00, 0x27, 0x10, 0x27,
+                             0x10, 0x00, 0x00, 0x00, 0x10, 0x8d, 0x50};
+    const struct profile_param params[] = {
+        {"position", 10000}, {"speed", 0}, {"acceleration", 16666.6666667}, {NULL, 0}};
     (void)state;
-    assert_int_equal(leadshine->golden_count, 1);
-    if (golden_bus_check(leadshine, &leadshine->golden[0], &err) < 0)
-        fail_msg("%s", err.text);
+    struct axis *a = begin(2);
+    struct session *s = session_on_bus(leadshine, bus, 7);
+    assert_int_equal(session_send(s, "move", params, NULL), GON_E_LINK); // no such drive here
+    assert_int_equal(tap.size[0], sizeof shown);
+    assert_memory_equal(tap.frame[0], shown, sizeof shown);
+    session_free(s);
+    end(a);
 }
 
 static void a_late_answer_to_one_poll_does_not_fit_another(void **state)
