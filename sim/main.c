@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // goniosim: the simulated bench on real wires.
 #include "base/options.h"
-#include "sim/server.h"
+#include "sim/bench_served.h"
 
 #include <signal.h>
 #include <stdbool.h>
@@ -98,8 +98,11 @@ static int serve(struct arguments *a)
     struct sim_config config;
     struct server *server;
     int rc = configure(&config, a, &err);
+    struct served *bench = rc == 0 ? bench_served_new(&config) : NULL;
+    if (rc == 0 && !bench)
+        rc = gon_fail(&err, GON_E_SYSTEM, "out of memory");
     if (rc == 0)
-        rc = server_open(&config, a->run_dir, &server, &err);
+        rc = server_open(bench, a->run_dir, &server, &err);
     if (rc)
         return fail(&err);
     printf("goniosim %s: %s, seed %d%s\nready\n", GONIO_VERSION, a->run_dir, config.seed,

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "sim/server.h"
 #include "base/clk.h"
-#include "sim/benchfile.h"
-#include "sim/control.h"
-#include "sim/rundir.h"
-#include "sim/wire.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -18,7 +15,7 @@
 
 #define PARENT_NS 500000000
 
-enum { CLIENTS = 8, LINE = 4096, FDS = BENCH_PORTS * WIRE_FDS + CLIENTS + 2 };
+enum { CLIENTS = 8, LINE = 4096, FDS = SERVER_WIRES * WIRE_FDS + CLIENTS + 2 };
 
 struct client {
     int fd; // -1: free
@@ -27,35 +24,13 @@ struct client {
 };
 
 struct server {
-    struct sim_config config;
-    struct bench bench;
+    struct served *served;
     struct rundir dir;
-    struct wire wire[BENCH_PORTS];
-    struct control control;
     struct client client[CLIENTS];
     int signal_fd, listen_fd;
 };
 
 // --- opening -------------------------------------------------------------------------------------
-
-static int open_wires(struct server *s, struct gon_error *err)
-{
-    for (int i = 0; i < BENCH_PORTS; i++) {
-        struct wire *w = &s->wire[i];
-        char path[RUNDIR_FILE];
-        rundir_path(&s->dir, bench_port_names[i], path, sizeof path);
-        if (i % 2)
-            wire_tcp_init(w, bench_port_names[i], bench_port(&s->bench, (enum bench_port)i));
-        else
-            wire_pty_init(w, bench_port_names[i], bench_port(&s->bench, (enum bench_port)i), path);
-        w->enforce = s->config.wire_speed;
-        w->bits = i == BENCH_AXES ? 11 : 10; // 8E1; 8N1
-    }
-    for (int i = 0; i < BENCH_PORTS; i++)
-        if (wire_plug(&s->wire[i], err))
-            return err->code;
-    return 0;
-}
 
 static int open_control(struct server *s, struct gon_error *err)
 {
@@ -83,29 +58,6 @@ static int open_signals(struct server *s, struct gon_error *err)
     return s->signal_fd >= 0 ? 0 : gon_fail(err, GON_E_SYSTEM, "signalfd: %s", strerror(errno));
 }
 
-static void write_serial(FILE *out, const void *ctx)
-{
-    const struct server *s = ctx;
-    char axes[700], laser[700], detector[700];
-    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", s->wire[BENCH_AXES].address,
-             s->config.axes_baud);
-    snprintf(laser, sizeof laser, "serial:%s?baud=%d", s->wire[BENCH_LASER].address,
-             s->config.laser_baud);
-    snprintf(detector, sizeof detector, "serial:%s?baud=%d", s->wire[BENCH_DETECTOR].address,
-             s->config.detector_baud);
-    benchfile_write(out, &s->config, &(struct benchfile_links){axes, laser, detector});
-}
-
-static void write_tcp(FILE *out, const void *ctx)
-{
-    const struct server *s = ctx;
-    char axes[700], laser[700], detector[700];
-    snprintf(axes, sizeof axes, "modbus-tcp:%s", s->wire[BENCH_AXES_TCP].address);
-    snprintf(laser, sizeof laser, "tcp:%s", s->wire[BENCH_LASER_TCP].address);
-    snprintf(detector, sizeof detector, "tcp:%s", s->wire[BENCH_DETECTOR_TCP].address);
-    benchfile_write(out, &s->config, &(struct benchfile_links){axes, laser, detector});
-}
-
 static void write_ready(FILE *out, const void *ctx)
 {
     (void)ctx;
@@ -116,25 +68,24 @@ static int open_all(struct server *s, const char *run_dir, struct gon_error *err
 {
     int rc = open_signals(s, err);
     rc = rc ? rc : rundir_open(&s->dir, run_dir, err);
-    rc = rc ? rc : open_wires(s, err);
+    rc = rc ? rc : s->served->ops->open(s->served, &s->dir, err);
     rc = rc ? rc : open_control(s, err);
-    rc = rc ? rc : rundir_write(&s->dir, "goniod.cfg", write_serial, s, err);
-    rc = rc ? rc : rundir_write(&s->dir, "goniod-tcp.cfg", write_tcp, s, err);
     return rc ? rc : rundir_write(&s->dir, "ready", write_ready, s, err);
 }
 
-int server_open(const struct sim_config *config, const char *run_dir, struct server **ret_server,
+int server_open(struct served *served, const char *run_dir, struct server **ret_server,
                 struct gon_error *err)
 {
     struct server *s = calloc(1, sizeof *s);
-    if (!s)
+    if (!s) {
+        served->ops->free(served);
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
-    s->config = *config;
-    s->control = (struct control){.bench = &s->bench, .wires = s->wire};
+    }
+    assert(served->wires_count <= SERVER_WIRES);
+    s->served = served;
     s->signal_fd = s->listen_fd = s->dir.lock_fd = s->dir.dir_fd = -1;
     for (int i = 0; i < CLIENTS; i++)
         s->client[i].fd = -1;
-    bench_init(&s->bench, &config->bench, clk_now_ns(clk_system()));
     int rc = open_all(s, run_dir, err);
     if (rc)
         server_close(s);
@@ -147,9 +98,9 @@ void server_close(struct server *s)
 {
     if (!s)
         return;
-    for (int i = 0; i < BENCH_PORTS; i++)
-        if (s->wire[i].ops)
-            wire_unplug(&s->wire[i]);
+    for (int i = 0; i < s->served->wires_count; i++)
+        if (s->served->wires[i].ops)
+            wire_unplug(&s->served->wires[i]);
     for (int i = 0; i < CLIENTS; i++)
         if (s->client[i].fd >= 0)
             close(s->client[i].fd);
@@ -158,6 +109,7 @@ void server_close(struct server *s)
     if (s->signal_fd >= 0)
         close(s->signal_fd);
     rundir_close(&s->dir);
+    s->served->ops->free(s->served);
     free(s);
 }
 
@@ -172,7 +124,7 @@ static void drop(struct client *c)
 
 static void answer(struct server *s, struct client *c, const char *line, int64_t t_ns)
 {
-    char *text = control_answer(&s->control, line, t_ns);
+    char *text = s->served->ops->control(s->served, line, t_ns);
     size_t size = text ? strlen(text) : 0;
     if (!text || send(c->fd, text, size, MSG_NOSIGNAL) != (ssize_t)size)
         drop(c); // gone, or it does not read its answers
@@ -222,34 +174,34 @@ static struct timespec until(int64_t due_ns, int64_t now_ns)
 
 static int64_t next_ns(const struct server *s, int64_t most_ns)
 {
-    for (int i = 0; i < BENCH_PORTS; i++) {
-        int64_t due_ns = wire_next_ns(&s->wire[i]);
+    for (int i = 0; i < s->served->wires_count; i++) {
+        int64_t due_ns = wire_next_ns(&s->served->wires[i]);
         most_ns = due_ns < most_ns ? due_ns : most_ns;
     }
     return most_ns;
 }
 
-static void serve_wires(struct server *s, struct pollfd wire_fds[BENCH_PORTS][WIRE_FDS],
+static void serve_wires(const struct served *s, struct pollfd wire_fds[SERVER_WIRES][WIRE_FDS],
                         int64_t t_ns)
 {
-    s->bench.axes_port[0].gap_ns = wire_char_ns(&s->wire[BENCH_AXES]) * 7 / 2; // 3.5 characters
-    for (int i = 0; i < BENCH_PORTS; i++)
-        wire_serve(&s->wire[i], wire_fds[i], t_ns);
+    for (int i = 0; i < s->wires_count; i++)
+        wire_serve(&s->wires[i], wire_fds[i], t_ns);
 }
 
 // One turn. False when it is time to go.
 static bool turn(struct server *s, int64_t most_ns)
 {
+    struct served *served = s->served;
     struct pollfd fds[FDS], *f = fds;
-    struct pollfd wire_fds[BENCH_PORTS][WIRE_FDS];
-    int at[BENCH_PORTS], count[BENCH_PORTS];
+    struct pollfd wire_fds[SERVER_WIRES][WIRE_FDS];
+    int at[SERVER_WIRES], count[SERVER_WIRES];
     *f++ = (struct pollfd){.fd = s->signal_fd, .events = POLLIN};
     *f++ = (struct pollfd){.fd = s->listen_fd, .events = POLLIN};
     for (int i = 0; i < CLIENTS; i++)
         *f++ = (struct pollfd){.fd = s->client[i].fd, .events = POLLIN};
-    for (int i = 0; i < BENCH_PORTS; i++) {
+    for (int i = 0; i < served->wires_count; i++) {
         at[i] = (int)(f - fds);
-        count[i] = wire_poll_fds(&s->wire[i], f);
+        count[i] = wire_poll_fds(&served->wires[i], f);
         f += count[i];
     }
     struct timespec left = until(next_ns(s, most_ns), clk_now_ns(clk_system()));
@@ -257,9 +209,10 @@ static bool turn(struct server *s, int64_t most_ns)
         return false;
     int64_t t_ns = clk_now_ns(clk_system());
     memset(wire_fds, 0, sizeof wire_fds);
-    for (int i = 0; i < BENCH_PORTS; i++)
+    for (int i = 0; i < served->wires_count; i++)
         memcpy(wire_fds[i], &fds[at[i]], (size_t)count[i] * sizeof fds[0]);
-    serve_wires(s, wire_fds, t_ns);
+    served->ops->turn(served);
+    serve_wires(served, wire_fds, t_ns);
     for (int i = 0; i < CLIENTS; i++)
         if (s->client[i].fd >= 0 && fds[2 + i].revents)
             serve_client(s, &s->client[i], t_ns);
