@@ -29,13 +29,13 @@ WARN := -Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wpointe
         -Wdouble-promotion $(if $(CI)$(WERROR),-Werror)
 CPPFLAGS += -I. -D_GNU_SOURCE -DGONIO_VERSION='"$(VERSION)"'
 CFLAGS   := -std=c17 $(WARN) $(OPT_$(VARIANT)) -ffp-contract=off -fno-math-errno -pthread $(EXTRA_CFLAGS)
-LDFLAGS  += $(filter -fsanitize% -fno-sanitize%,$(CFLAGS)) -pthread
+LDFLAGS  += -Wl,--as-needed $(filter -fsanitize% -fno-sanitize%,$(CFLAGS)) -pthread
 
 # The layers, and for each program the layers it is made of, users before what they use.
 LAYERS        := base model fit drivers campaign sim daemon cli
 USES_goniod   := daemon campaign drivers fit model base
 USES_gonio    := cli campaign drivers fit model base
-USES_goniosim := sim model base
+USES_goniosim := sim drivers model base
 LIBS_base     := -lconfig
 LIBS_drivers  := -lmodbus -lserialport
 LIBS_campaign := -lsqlite3 -ljansson

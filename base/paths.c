@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "base/paths.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,4 +42,20 @@ int paths_socket(char *ret_path, size_t size, struct gon_error *err)
     if (rc == 0)
         snprintf(ret_path, size, "%s", path);
     return rc;
+}
+
+void paths_program(const char *name, char *ret_path, size_t size)
+{
+    static const char *const places[] = {"", "../bin/"};
+    char self[PATH_MAX];
+    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
+    self[n > 0 ? n : 0] = 0;
+    char *slash = strrchr(self, '/');
+    for (size_t i = 0; slash && i < sizeof places / sizeof places[0]; i++) {
+        slash[1] = 0;
+        int used = snprintf(ret_path, size, "%s%s%s", self, places[i], name);
+        if (used > 0 && (size_t)used < size && access(ret_path, X_OK) == 0)
+            return;
+    }
+    snprintf(ret_path, size, "%s", name);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where the daemon and the command meet when nobody says otherwise. Thread: any.
+// Where the daemon and the command meet when nobody says otherwise, and where programs are that
+// belong together. Thread: any.
 #pragma once
 #include "base/err.h"
 
@@ -11,3 +12,7 @@ int paths_socket(char *ret_path, size_t size, struct gon_error *err);
 
 // GON_E_INPUT when the path is empty or longer than the 107 bytes that a socket's address holds.
 int paths_socket_fits(const char *path, struct gon_error *err);
+
+// Another of gonio's programs: beside this one (as it was built), in ../bin (as installed), else its
+// name alone, for PATH to find.
+void paths_program(const char *name, char *ret_path, size_t size);

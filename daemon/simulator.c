@@ -2,6 +2,7 @@
 #include "daemon/simulator.h"
 
 #include "base/clk.h"
+#include "base/paths.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -27,30 +28,6 @@ struct simulator {
 };
 
 extern char **environ;
-
-static bool runs(const char *path)
-{
-    return access(path, X_OK) == 0;
-}
-
-// Beside this program in the build folder, in ../bin when installed, else what PATH finds.
-static void find_program(char *ret_path, size_t size)
-{
-    char self[PATH_MAX / 2];
-    ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[n > 0 ? n : 0] = 0;
-    char *slash = strrchr(self, '/');
-    if (slash) {
-        *slash = 0;
-        snprintf(ret_path, size, "%s/goniosim", self);
-        if (runs(ret_path))
-            return;
-        snprintf(ret_path, size, "%s/../bin/goniosim", self);
-        if (runs(ret_path))
-            return;
-    }
-    snprintf(ret_path, size, "goniosim");
-}
 
 static int make_folder(struct simulator *s, struct gon_error *err)
 {
@@ -103,7 +80,7 @@ static int start_process(struct simulator *s, const struct simulator_options *op
     char *argv[MOST_ARGUMENTS] = {program, (char *)"--run-dir", s->folder,
                                   (char *)"--exit-with-parent"};
     int argc = 4, ends[2];
-    find_program(program, sizeof program);
+    paths_program("goniosim", program, sizeof program);
     if (options->fast)
         argv[argc++] = (char *)"--fast";
     if (options->seed >= 0) {

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
-// goniosim: the simulated bench on real wires.
+// goniosim: the simulated bench on real wires, or one instrument made from its profile.
 #include "base/options.h"
+#include "sim/actor_served.h"
 #include "sim/bench_served.h"
 
+#include <errno.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -13,8 +17,8 @@
 enum { MOST_SETS = 64 };
 
 struct arguments {
-    const char *run_dir, *config, *set;
-    long seed;
+    const char *run_dir, *config, *set, *profile;
+    long seed, unit;
     bool fast, with_parent, help, version, options, settings;
     char *sets[MOST_SETS];
     int set_count;
@@ -23,7 +27,11 @@ struct arguments {
 
 static const struct option_row rows[] = {
     {"--run-dir", OPTION_TEXT, offsetof(struct arguments, run_dir), "DIR", 0, 0,
-     "where wires and files appear; required"},
+     "where wires and files appear; required for the bench"},
+    {"--profile", OPTION_TEXT, offsetof(struct arguments, profile), "PROFILE", 0, 0,
+     "instead of the bench: one instrument by its profile, a file or a name"},
+    {"--unit", OPTION_INT, offsetof(struct arguments, unit), "N", 1, 247,
+     "Modbus address of that instrument"},
     {"--config", OPTION_TEXT, offsetof(struct arguments, config), "FILE", 0, 0, "a sim.cfg"},
     {"--set", OPTION_TEXT, offsetof(struct arguments, set), "NAME=VALUE", 0, 0,
      "one setting of sim.cfg; may be repeated"},
@@ -92,25 +100,94 @@ static int configure(struct sim_config *c, struct arguments *a, struct gon_error
     return rc;
 }
 
-static int serve(struct arguments *a)
+static void run(struct server *server, const struct arguments *a)
 {
-    struct gon_error err = {.text = ""};
-    struct sim_config config;
-    struct server *server;
-    int rc = configure(&config, a, &err);
-    struct served *bench = rc == 0 ? bench_served_new(&config) : NULL;
-    if (rc == 0 && !bench)
-        rc = gon_fail(&err, GON_E_SYSTEM, "out of memory");
-    if (rc == 0)
-        rc = server_open(bench, a->run_dir, &server, &err);
-    if (rc)
-        return fail(&err);
-    printf("goniosim %s: %s, seed %d%s\nready\n", GONIO_VERSION, a->run_dir, config.seed,
-           a->fast ? ", fast" : "");
+    printf("ready\n");
     if (fflush(stdout) == 0 || !a->with_parent) // else whoever waits for it is gone
         server_run(server, a->parent);
     server_close(server);
+}
+
+static int serve_bench(struct arguments *a, struct gon_error *err)
+{
+    struct sim_config config;
+    struct server *server;
+    int rc = configure(&config, a, err);
+    struct served *bench = rc == 0 ? bench_served_new(&config) : NULL;
+    if (rc == 0 && !bench)
+        rc = gon_fail(err, GON_E_SYSTEM, "out of memory");
+    if (rc == 0)
+        rc = server_open(bench, a->run_dir, &server, err);
+    if (rc)
+        return rc;
+    printf("goniosim %s: %s, seed %d%s\n", GONIO_VERSION, a->run_dir, config.seed,
+           a->fast ? ", fast" : "");
+    run(server, a);
     return 0;
+}
+
+// --- one instrument ------------------------------------------------------------------------------
+
+// A profile in this folder is meant by "x.cfg", too.
+static int load(const char *name, struct profile **ret_profile, struct gon_error *err)
+{
+    char path[PATH_MAX];
+    size_t size = strlen(name);
+    bool file = !strchr(name, '/') && size > 4 && strcmp(name + size - 4, ".cfg") == 0;
+    int rc = 0;
+    if (file)
+        snprintf(path, sizeof path, "%s", name);
+    else
+        rc = profile_find(name, NULL, path, sizeof path, err);
+    if (rc == 0 && profile_load(path, (struct cfg_sink){say, NULL}, ret_profile, NULL))
+        rc = gon_fail(err, GON_E_INPUT, "%s is not usable; nothing was started", path);
+    return rc;
+}
+
+// The folder of the run when none was given, to be removed afterwards.
+static int make_folder(char *ret_path, size_t size, struct gon_error *err)
+{
+    const char *runtime = getenv("XDG_RUNTIME_DIR");
+    snprintf(ret_path, size, "%s/goniosim-XXXXXX", runtime && *runtime ? runtime : "/tmp");
+    if (!mkdtemp(ret_path))
+        return gon_fail(err, GON_E_SYSTEM, "folder %s: %s", ret_path, strerror(errno));
+    return 0;
+}
+
+static int serve_in(const struct profile *p, const char *folder, const struct arguments *a,
+                    struct gon_error *err)
+{
+    const struct actor_spec spec = {.profile = p, .unit = (int)a->unit, .enforce = !a->fast};
+    struct served *served;
+    struct server *server;
+    int rc = actor_served_new(&spec, &served, err);
+    if (rc == 0)
+        rc = server_open(served, folder, &server, err);
+    if (rc)
+        return rc;
+    printf("goniosim %s: %s\n", GONIO_VERSION, p->title);
+    actor_served_links(served, stdout);
+    printf("control: %s/control.sock\n", folder);
+    run(server, a);
+    return 0;
+}
+
+static int serve_profile(const struct arguments *a, struct gon_error *err)
+{
+    char folder[PATH_MAX] = "";
+    struct profile *p = NULL;
+    if (a->config || a->set_count > 0 || a->seed >= 0)
+        return gon_fail(err, GON_E_INPUT,
+                        "--config, --set and --seed are of the bench, not of --profile");
+    int rc = load(a->profile, &p, err);
+    if (rc == 0 && !a->run_dir)
+        rc = make_folder(folder, sizeof folder, err);
+    if (rc == 0)
+        rc = serve_in(p, a->run_dir ? a->run_dir : folder, a, err);
+    if (*folder)
+        rmdir(folder);
+    free(p);
+    return rc;
 }
 
 // What is only asked about the program. True when that was all.
@@ -118,7 +195,8 @@ static bool describe(const struct arguments *a)
 {
     if (a->help)
         printf("goniosim --run-dir DIR [options]: a simulated BRDF bench on ptys, TCP and a\n"
-               "control socket\n");
+               "control socket\n"
+               "goniosim --profile PROFILE [options]: one instrument the same way\n");
     if (a->help)
         options_describe(stdout, rows);
     else if (a->version)
@@ -135,7 +213,7 @@ static bool describe(const struct arguments *a)
 int main(int argc, char **argv)
 {
     struct gon_error err = {.text = ""};
-    struct arguments a = {.seed = -1};
+    struct arguments a = {.seed = -1, .unit = 1};
     const char *operands[1];
     argc = take_sets(argc, argv, &a, &err);
     int rc = argc < 0 ? argc : options_take(argc, argv, rows, &a, operands, 0, &err);
@@ -143,7 +221,7 @@ int main(int argc, char **argv)
         return fail(&err);
     if (describe(&a))
         return 0;
-    if (!a.run_dir) {
+    if (!a.run_dir && !a.profile) {
         gon_fail(&err, GON_E_INPUT, "--run-dir DIR is missing; see --help");
         return fail(&err);
     }
@@ -151,5 +229,6 @@ int main(int argc, char **argv)
         a.parent = getppid();
         prctl(PR_SET_PDEATHSIG, SIGTERM);
     }
-    return serve(&a);
+    rc = a.profile ? serve_profile(&a, &err) : serve_bench(&a, &err);
+    return rc ? fail(&err) : 0;
 }
