@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const bench_axis_drivers[] = {"oriental-az", NULL};
+const char *const bench_axis_drivers[] = {"oriental-az", "leadshine-pr", NULL};
 static const char *const regimes[] = {"underfilled", "overfilled", NULL};
 static const char *const axis_names[] = {"theta_i", "theta_r", "sample", NULL};
 

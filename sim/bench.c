@@ -6,6 +6,8 @@
 const char *const bench_port_names[BENCH_PORTS] = {"axes",      "axes-tcp", "laser",
                                                    "laser-tcp", "detector", "detector-tcp"};
 
+const char *const bench_controllers[] = {"oriental-az", "leadshine-pr", NULL};
+
 void bench_defaults(struct bench_spec *ret_spec)
 {
     *ret_spec = (struct bench_spec){
@@ -25,9 +27,37 @@ static int64_t ns(double s)
     return (int64_t)(s * 1e9);
 }
 
+static void controllers_init(struct bench *b, const struct bench_spec *spec, enum world_axis axis)
+{
+    const struct sim_az_spec az = {.steps_per_unit = spec->steps_per_unit[axis],
+                                   .home_speed = spec->home_speed,
+                                   .home_acceleration = spec->home_acceleration,
+                                   .start_s = spec->start_s,
+                                   .homed = spec->homed};
+    const struct sim_leadshine_spec leadshine = {.steps_per_unit = az.steps_per_unit,
+                                                 .home_speed = az.home_speed,
+                                                 .home_acceleration = az.home_acceleration,
+                                                 .start_s = az.start_s,
+                                                 .homed = az.homed};
+    sim_az_init(&b->az[axis], &b->world, axis, &az);
+    sim_leadshine_init(&b->leadshine[axis], &b->world, axis, &leadshine);
+}
+
+static struct sim_modbus_unit unit_of(struct bench *b, int axis)
+{
+    if (b->controller == BENCH_LEADSHINE)
+        return (struct sim_modbus_unit){.id = axis + 1,
+                                        .read = sim_leadshine_read,
+                                        .write = sim_leadshine_write,
+                                        .ctx = &b->leadshine[axis]};
+    return (struct sim_modbus_unit){
+        .id = axis + 1, .read = sim_az_read, .write = sim_az_write, .ctx = &b->az[axis]};
+}
+
 void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns)
 {
     world_init(&b->world, &spec->world, t_ns);
+    b->controller = spec->controller;
     sim_cobolt_init(&b->laser, &b->world, ns(spec->laser_reply_s));
     b->laser.echo = spec->laser_echo;
     sim_sr830_init(&b->detector, &b->world, ns(spec->detector_reply_s));
@@ -37,17 +67,9 @@ void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns)
         sim_sr830_port_init(&b->detector_port[tcp], &b->detector);
     }
     for (int i = 0; i < WORLD_AXES; i++) {
-        struct sim_az_spec az = {.steps_per_unit = spec->steps_per_unit[i],
-                                 .home_speed = spec->home_speed,
-                                 .home_acceleration = spec->home_acceleration,
-                                 .start_s = spec->start_s,
-                                 .homed = spec->homed};
-        sim_az_init(&b->az[i], &b->world, (enum world_axis)i, &az);
+        controllers_init(b, spec, (enum world_axis)i);
         for (int tcp = 0; tcp < 2; tcp++)
-            sim_modbus_add(&b->axes_port[tcp], (struct sim_modbus_unit){.id = i + 1,
-                                                                        .read = sim_az_read,
-                                                                        .write = sim_az_write,
-                                                                        .ctx = &b->az[i]});
+            sim_modbus_add(&b->axes_port[tcp], unit_of(b, i));
     }
 }
 
@@ -63,4 +85,33 @@ struct port *bench_port(struct bench *b, enum bench_port which)
     case BENCH_DETECTOR_TCP: return &b->detector_port[tcp].port;
     default: return NULL;
     }
+}
+
+// --- an axis' controller -------------------------------------------------------------------------
+
+struct bench_axis bench_axis(const struct bench *b, enum world_axis axis, int64_t t_ns)
+{
+    const struct sim_az *z = &b->az[axis];
+    const struct sim_leadshine *l = &b->leadshine[axis];
+    if (b->controller == BENCH_LEADSHINE)
+        return (struct bench_axis){l->homed, l->alarm, sim_leadshine_position_steps(l, t_ns),
+                                   l->moves, l->ignored};
+    return (struct bench_axis){z->homed, z->alarm, sim_az_position_steps(z, t_ns), z->moves,
+                               z->ignored};
+}
+
+void bench_raise(struct bench *b, enum world_axis axis, int alarm, int64_t t_ns)
+{
+    if (b->controller == BENCH_LEADSHINE)
+        sim_leadshine_raise(&b->leadshine[axis], alarm, t_ns);
+    else
+        sim_az_raise(&b->az[axis], alarm, t_ns);
+}
+
+void bench_power_cycle(struct bench *b, enum world_axis axis, int64_t t_ns)
+{
+    if (b->controller == BENCH_LEADSHINE)
+        sim_leadshine_power_cycle(&b->leadshine[axis], t_ns);
+    else
+        sim_az_power_cycle(&b->az[axis], t_ns);
 }

@@ -5,6 +5,7 @@
 #pragma once
 #include "sim/az.h"
 #include "sim/cobolt.h"
+#include "sim/leadshine.h"
 #include "sim/modbus.h"
 #include "sim/sr830.h"
 #include "sim/world.h"
@@ -21,19 +22,25 @@ enum bench_port {
 
 extern const char *const bench_port_names[BENCH_PORTS]; // "axes", "axes-tcp", "laser", ...
 
+enum bench_controller { BENCH_AZ, BENCH_LEADSHINE }; // of the axes
+extern const char *const bench_controllers[];        // what drivers call them; NULL at the end
+
 struct bench_spec {
     struct world_spec world;
     double steps_per_unit[WORLD_AXES];
     double home_speed, home_acceleration; // deg/s, deg/s2; mm for the stage
     double start_s;                       // from a command to the motor
     bool homed;
+    int controller; // enum bench_controller
     double laser_reply_s, detector_reply_s, axes_reply_s;
     bool laser_echo;
 };
 
 struct bench {
     struct world world;
-    struct sim_az az[WORLD_AXES]; // units 1, 2, 3
+    int controller;
+    struct sim_az az[WORLD_AXES];               // units 1, 2, 3
+    struct sim_leadshine leadshine[WORLD_AXES]; // or these
     struct sim_cobolt laser;
     struct sim_sr830 detector;
     struct sim_modbus axes_port[2]; // serial, TCP
@@ -45,3 +52,15 @@ void bench_defaults(struct bench_spec *ret_spec);
 // The bench must not move in memory afterwards.
 void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns);
 struct port *bench_port(struct bench *b, enum bench_port which);
+
+// What an axis' controller says of itself, whichever kind it is.
+struct bench_axis {
+    bool homed;
+    int alarm; // 0: none
+    int32_t steps;
+    uint64_t moves, ignored; // commands carried out, and echoed but ignored
+};
+
+struct bench_axis bench_axis(const struct bench *b, enum world_axis axis, int64_t t_ns);
+void bench_raise(struct bench *b, enum world_axis axis, int alarm, int64_t t_ns);
+void bench_power_cycle(struct bench *b, enum world_axis axis, int64_t t_ns);

@@ -55,6 +55,12 @@ static const struct cfg_row optics_rows[] = {
     {0}};
 
 static const struct cfg_row axes_rows[] = {
+    {.name = "controller",
+     .type = CFG_CHOICE,
+     .offset = AT(bench.controller),
+     .fallback = "\"oriental-az\"",
+     .help = "what drives the axes; also written into the bench files for goniod",
+     .choices = bench_controllers},
     REAL("speed", speed, "deg/s", 0.01, 2000, "20", "written into the bench files for goniod"),
     REAL("acceleration", acceleration, "deg/s2", 0.1, 1e6, "60",
          "written into the bench files for goniod"),

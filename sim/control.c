@@ -7,10 +7,9 @@ static struct bench *the(const struct request *r)
     return r->subject;
 }
 
-static struct sim_az *the_axis(struct request *r)
+static int the_axis(struct request *r)
 {
-    int i = request_choice(r, "axis", world_axis_names, WORLD_AXES);
-    return i < 0 ? NULL : &the(r)->az[i];
+    return request_choice(r, "axis", world_axis_names, WORLD_AXES);
 }
 
 // --- what is asked -------------------------------------------------------------------------------
@@ -19,14 +18,13 @@ static json_t *axes_state(const struct request *r)
 {
     json_t *all = json_object();
     for (int i = 0; i < WORLD_AXES; i++) {
-        const struct sim_az *z = &the(r)->az[i];
+        const struct bench_axis a = bench_axis(the(r), (enum world_axis)i, r->t_ns);
         struct motion_state s = motion_at(&the(r)->world.axis[i], r->t_ns);
         json_object_set_new(all, world_axis_names[i],
                             json_pack("{s:f,s:f,s:f,s:b,s:b,s:i,s:i,s:I,s:I}", "motor", s.motor,
                                       "load", s.load, "speed", s.speed, "moving", s.moving, "homed",
-                                      z->homed, "alarm", z->alarm, "steps",
-                                      (int)sim_az_position_steps(z, r->t_ns), "moves",
-                                      (json_int_t)z->moves, "ignored", (json_int_t)z->ignored));
+                                      a.homed, "alarm", a.alarm, "steps", (int)a.steps, "moves",
+                                      (json_int_t)a.moves, "ignored", (json_int_t)a.ignored));
     }
     return all;
 }
@@ -92,9 +90,9 @@ static void do_truth(struct request *r)
 
 static void do_power_cycle(struct request *r)
 {
-    struct sim_az *z = the_axis(r);
-    if (z)
-        sim_az_power_cycle(z, r->t_ns);
+    int axis = the_axis(r);
+    if (axis >= 0)
+        bench_power_cycle(the(r), (enum world_axis)axis, r->t_ns);
 }
 
 static const char *const interlock_words[] = {"open", "closed"};
@@ -132,12 +130,12 @@ static void set_saturate(struct request *r, json_t *v)
 
 static void set_alarm(struct request *r, json_t *v)
 {
-    struct sim_az *z = the_axis(r);
+    int axis = the_axis(r);
     json_int_t code = json_integer_value(v);
     if (!json_is_integer(v) || code < 1 || code > 255)
         request_refuse(r, "'alarm' must be a whole number, 1..255");
-    else if (z)
-        sim_az_raise(z, (int)code, r->t_ns);
+    else if (axis >= 0)
+        bench_raise(the(r), (enum world_axis)axis, (int)code, r->t_ns);
 }
 
 static void set_term(struct request *r, json_t *v)
