@@ -3,8 +3,8 @@
 // the driver does I/O. No call waits for motion; each is one or two transactions. Thread:
 // instrument.
 //
-// Axes are made from profiles (by_profile.h). move_abs is never repeated by a driver: when its answer is lost, the caller reads the status and
-// decides. stop may be repeated and is.
+// Axes are made from profiles (by_profile.h). move_abs is never repeated by a driver: when its
+// answer is lost, the caller reads the status and decides. stop may be repeated and is.
 #pragma once
 #include "base/err.h"
 

@@ -42,7 +42,7 @@ static bool holds(const struct profiled_axis *z, const char *condition)
 
 static int32_t steps(double number)
 {
-    return isnan(number) ? 0 : (int32_t)lround(number);
+    return isfinite(number) ? (int32_t)lround(number) : 0;
 }
 
 // While it moves, a command position is where its profile of speeds is, not where it leads: then
@@ -55,15 +55,15 @@ static struct axis_status look(const struct profiled_axis *z)
         .position_steps = steps(session_number(z->s, is->position)),
         .target_steps = steps(session_number(z->s, *is->target ? is->target : is->position)),
         .moving = holds(z, is->moving),
-        .in_position = holds(z, is->in_position),
-        .ready = holds(z, is->ready),
         .homed = holds(z, is->homed),
         .alarm = holds(z, is->alarm),
         .limit = holds(z, is->limit),
         .following = holds(z, is->following),
-        .alarm_code = isnan(code) ? 0 : (int)code,
+        .alarm_code = steps(code),
     };
     s.alarm = s.alarm || s.alarm_code != 0;
+    s.in_position = *is->in_position ? holds(z, is->in_position) : !s.moving;
+    s.ready = *is->ready ? holds(z, is->ready) : !s.alarm;
     if (s.moving && z->moved)
         s.target_steps = z->target;
     return s;
@@ -87,7 +87,7 @@ static int status(struct axis *a, struct axis_status *ret_status, struct gon_err
     int rc = keep_watchdog(z, err);
     if (rc == 0)
         rc = session_ask(z->s, &z->is->status, err);
-    if (rc == 0 && isnan(session_number(z->s, z->is->position)))
+    if (rc == 0 && !isfinite(session_number(z->s, z->is->position)))
         return gon_fail(err, GON_E_DEVICE, "%s: it does not know its position", session_link(z->s));
     if (rc == 0)
         *ret_status = look(z);
@@ -145,14 +145,22 @@ static int stop(struct axis *a, struct gon_error *err)
 
 static int home(struct axis *a, struct gon_error *err)
 {
-    axis_of(a)->moved = false;
-    return session_send(axis_of(a)->s, axis_of(a)->is->home, NULL, err);
+    struct profiled_axis *z = axis_of(a);
+    if (!*z->is->home)
+        return gon_fail(err, GON_E_DEVICE, "%s: cannot be homed from here; home it by hand",
+                        session_link(z->s));
+    z->moved = false;
+    return session_send(z->s, z->is->home, NULL, err);
 }
 
 // A drive that had an alarm may have switched its motor off.
 static int reset_alarm(struct axis *a, struct gon_error *err)
 {
     struct profiled_axis *z = axis_of(a);
+    if (!*z->is->reset)
+        return gon_fail(err, GON_E_DEVICE,
+                        "%s: its alarm cannot be reset from here; switch it off and on",
+                        session_link(z->s));
     int rc = session_send(z->s, z->is->reset, NULL, err);
     return rc < 0 ? rc : send_if_any(z, z->is->enable, err);
 }

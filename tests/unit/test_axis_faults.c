@@ -19,7 +19,7 @@
 #define MS(ms) CLK_MS(ms)
 #define SPEED 20000
 #define ACCELERATION 600000
-enum { MOVES = 200, SEED = 2026, MAKES = BENCH_LEADSHINE + 1 };
+enum { MOVES = 120, SEED = 2026, MAKES = BENCH_LEADSHINE + 1 };
 
 static const char *const fault_names[] = {"lost",  "late",           "doubled",       "cut",
                                           "split", "garbage before", "garbage after", "changed"};
