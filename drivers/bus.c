@@ -10,6 +10,8 @@
 #include <stdlib.h>
 
 #define READ_TRIES 3
+#define TIMEOUT_MOST_MS 200
+#define QUIET_MOST_MS 1000
 #define GAP_LEAST_NS 1750000
 #define BUSY_FIRST_NS CLK_MS(10) // doubles
 #define BUSY_MOST_NS CLK_S(1)
@@ -50,10 +52,11 @@ int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
     int rc = link_parse(link, LINK_MODBUS, &l, err);
     if (rc < 0)
         return rc;
-    if (timeout_ms < 10 || timeout_ms > 200 || quiet_ms < 20 || quiet_ms > 1000)
+    if (timeout_ms < 10 || timeout_ms > TIMEOUT_MOST_MS || quiet_ms < 20 ||
+        quiet_ms > QUIET_MOST_MS)
         return gon_fail(err, GON_E_INPUT,
-                        "%s: timeout %d ms, quiet %d ms; allowed: 10..200 ms and 20..1000 ms", link,
-                        timeout_ms, quiet_ms);
+                        "%s: timeout %d ms, quiet %d ms; allowed: 10..%d ms and 20..%d ms", link,
+                        timeout_ms, quiet_ms, TIMEOUT_MOST_MS, QUIET_MOST_MS);
     struct bus *b = calloc(1, sizeof *b);
     if (!b)
         return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
@@ -84,6 +87,19 @@ void bus_close(struct bus *b)
     modbus_master_free(b->master);
     transport_close(b->t);
     free(b);
+}
+
+static int raised(int now, int wish, int most)
+{
+    const int wanted = wish < most ? wish : most;
+    return wanted > now ? wanted : now;
+}
+
+void bus_expect(struct bus *b, int timeout_ms, int quiet_ms)
+{
+    b->timeout_ms = raised(b->timeout_ms, timeout_ms, TIMEOUT_MOST_MS);
+    b->quiet_ms = raised(b->quiet_ms, quiet_ms, QUIET_MOST_MS);
+    modbus_master_set_timeout(b->master, b->timeout_ms);
 }
 
 int bus_reopen(struct bus *b, struct gon_error *err)

@@ -35,6 +35,9 @@ struct bus_stats {
 int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
              const struct cancel *cancel, struct bus **ret_bus, struct gon_error *err);
 void bus_close(struct bus *b);
+// What one of its units needs: both are raised to that, never lowered, and stay within the limits
+// above. 0: whatever they are.
+void bus_expect(struct bus *b, int timeout_ms, int quiet_ms);
 int bus_reopen(struct bus *b, struct gon_error *err); // one try
 
 enum bus_table { BUS_HOLDING, BUS_INPUT, BUS_COIL, BUS_DISCRETE };

@@ -308,6 +308,7 @@ struct session *session_on_bus(const struct profile *p, struct bus *bus, int uni
     session_init(&z->session, &ops, p);
     z->bus = bus;
     z->unit = unit;
+    bus_expect(bus, (int)p->registers.timeout_ms, (int)p->registers.quiet_ms);
     snprintf(z->link, sizeof z->link, "%s: unit %d", bus_link(bus), unit);
     return &z->session;
 }

@@ -30,12 +30,17 @@ struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeo
         return NULL;
     }
     m->t = t;
+    modbus_master_set_timeout(m, timeout_ms);
+    modbus_set_error_recovery(m->library, MODBUS_ERROR_RECOVERY_NONE);
+    return m;
+}
+
+void modbus_master_set_timeout(struct modbus_master *m, int timeout_ms)
+{
     const int byte_ms = timeout_ms < BYTE_GAP_MS ? timeout_ms : BYTE_GAP_MS;
     modbus_set_response_timeout(m->library, (uint32_t)timeout_ms / 1000,
                                 (uint32_t)(timeout_ms % 1000) * 1000);
     modbus_set_byte_timeout(m->library, 0, (uint32_t)byte_ms * 1000);
-    modbus_set_error_recovery(m->library, MODBUS_ERROR_RECOVERY_NONE);
-    return m;
 }
 
 void modbus_master_free(struct modbus_master *m)

@@ -33,6 +33,7 @@ enum {
 // The transport is borrowed. timeout_ms: of the first byte; the following may be 50 ms apart.
 struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeout_ms);
 void modbus_master_free(struct modbus_master *m);
+void modbus_master_set_timeout(struct modbus_master *m, int timeout_ms);
 
 // The descriptor may have changed since the last call. A descriptor of 1024 or more would abort in
 // libmodbus' select(): GON_E_SYSTEM. GON_E_GONE when the transport is closed.

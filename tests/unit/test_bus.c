@@ -148,6 +148,25 @@ static void wrong_settings_are_refused(void **state)
     assert_null(b);
 }
 
+// A unit that is slower than the bench thought. It never lowers what another needs.
+static void a_slow_unit_is_given_its_time(void **state)
+{
+    uint16_t r[8];
+    (void)state;
+    struct bus *b = begin(&slave.m.port, NULL);
+    bus_expect(b, 150, 0);
+    bus_expect(b, 20, 20);
+    slave.m.port.delay_ns = MS(140);
+    assert_int_equal(bus_read(b, 1, 0, 4, r, NULL), 0);
+    assert_int_equal(bus_stats(b)->timeouts, 0);
+    bus_expect(b, 500, 5000); // but nobody is waited for without end
+    slave.m.port.drop = 1;
+    const int64_t start_ns = vline.clk.t_ns;
+    assert_int_equal(bus_read(b, 1, 0, 4, r, NULL), 0);
+    assert_in_range(vline.clk.t_ns - start_ns, MS(1200), MS(1210));
+    bus_close(b);
+}
+
 static void exceptions_name_function_address_and_count(void **state)
 {
     uint16_t r[8] = {42};
@@ -658,6 +677,7 @@ int main(void)
         cmocka_unit_test(the_line_is_silent_between_frames),
         cmocka_unit_test(a_slow_line_has_longer_gaps),
         cmocka_unit_test(wrong_settings_are_refused),
+        cmocka_unit_test(a_slow_unit_is_given_its_time),
         cmocka_unit_test(exceptions_name_function_address_and_count),
         cmocka_unit_test(a_busy_unit_is_waited_for),
         cmocka_unit_test(an_acknowledged_write_is_not_repeated),

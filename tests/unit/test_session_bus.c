@@ -18,6 +18,7 @@
 static const char text[] =
     "profile: { name = \"u\"; title = \"Unit\"; role = \"inputs\"; source = \"this test\";"
     "  protocol = \"modbus\"; };\n"
+    "registers: { timeout_ms = 120; };\n"
     "values: (\n"
     "  { name = \"kind\"; type = \"int\"; address = 1; access = \"r\"; },\n"
     "  { name = \"level\"; unit = \"V\"; scale = 0.01; min = 0; max = 10; resolution = 0.01;"
@@ -179,6 +180,16 @@ static void another_kind_is_refused_and_a_restart_noticed(void **state)
     assert_int_equal(session_identify(s, title, sizeof title, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "unit 5 is another kind"));
     assert_int_equal(writes.count, 0);
+    end(s);
+}
+
+static void a_slow_unit_is_given_the_time_that_its_profile_says(void **state)
+{
+    (void)state;
+    struct session *s = begin(); // on a bus that waits for 50 ms
+    slaves.port.delay_ns = MS(110);
+    assert_int_equal(session_ask_one(s, "level", NULL), 0);
+    assert_int_equal(bus_stats(bus)->requests, 1);
     end(s);
 }
 
@@ -351,6 +362,7 @@ int main(void)
         cmocka_unit_test(what_means_nothing_now_is_not_known),
         cmocka_unit_test(an_unbelievable_answer_changes_nothing),
         cmocka_unit_test(another_kind_is_refused_and_a_restart_noticed),
+        cmocka_unit_test(a_slow_unit_is_given_the_time_that_its_profile_says),
         cmocka_unit_test(a_name_that_is_not_there_is_said),
         cmocka_unit_test(what_was_set_is_read_back),
         cmocka_unit_test(another_value_read_back_is_a_refusal),
