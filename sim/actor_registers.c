@@ -23,26 +23,36 @@ static int words(const struct profile_value *v)
     return !bit && v->format >= PROFILE_U32 ? 2 : 1;
 }
 
-static bool find(const struct actor *a, int table, int address, struct cell *ret)
+static int first_of(const struct actor *a, const struct profile_value *v)
 {
+    return (int)v->address - the(a)->registers.base;
+}
+
+// Where two values lie in one register the one counts that can be read, or written.
+static bool find(const struct actor *a, int table, int address, int wanted, struct cell *ret)
+{
+    bool found = false;
     for (int i = 0; i < the(a)->values_count; i++) {
         const struct profile_value *v = &the(a)->values[i];
-        int word = address - ((int)v->address - the(a)->registers.base);
-        if (v->table == table && word >= 0 && word < words(v)) {
-            *ret = (struct cell){i, word};
+        int word = address - first_of(a, v);
+        bool fits = v->access == wanted || v->access == PROFILE_READ_WRITE;
+        if (v->table != table || word < 0 || word >= words(v) || (found && !fits))
+            continue;
+        *ret = (struct cell){i, word};
+        if (fits)
             return true;
-        }
+        found = true;
     }
-    return false;
+    return found;
 }
 
 static bool bridged(const struct actor *a, int table, int address)
 {
     struct cell c;
     int most = the(a)->registers.gap_most, below = 1, above = 1;
-    while (below <= most && !find(a, table, address - below, &c))
+    while (below <= most && !find(a, table, address - below, PROFILE_READ, &c))
         below++;
-    while (above <= most && !find(a, table, address + above, &c))
+    while (above <= most && !find(a, table, address + above, PROFILE_READ, &c))
         above++;
     return below + above - 1 <= most;
 }
@@ -88,11 +98,11 @@ static double decoded(const struct profile_value *v, uint32_t bits)
     }
 }
 
-static uint16_t encode(const struct actor *a, struct cell c)
+static uint16_t encode(const struct actor_values *now, struct cell c)
 {
-    const struct profile_value *v = &the(a)->values[c.value];
-    uint32_t bits = encoded(v, actor_values_wire(&a->now, c.value));
-    return turned(the(a), (uint16_t)(is_upper(the(a), v, c.word) ? bits >> 16 : bits));
+    const struct profile_value *v = &now->profile->values[c.value];
+    uint32_t bits = encoded(v, actor_values_wire(now, c.value));
+    return turned(now->profile, (uint16_t)(is_upper(now->profile, v, c.word) ? bits >> 16 : bits));
 }
 
 static double decode(const struct profile *p, const struct profile_value *v, const uint16_t *r)
@@ -113,8 +123,8 @@ static int read_table(struct actor *a, int table, int address, int count, uint16
     actor_step(a, t_ns);
     for (int i = 0; i < count; i++) {
         struct cell c;
-        if (find(a, table, address + i, &c))
-            ret[i] = encode(a, c);
+        if (find(a, table, address + i, PROFILE_READ, &c))
+            ret[i] = encode(&a->now, c);
         else if (bridged(a, table, address + i))
             ret[i] = 0;
         else
@@ -144,21 +154,64 @@ struct written {
     bool value[PROFILE_VALUES];
 };
 
+// The widest value that begins here and is written as a whole.
+static bool whole(const struct actor *a, int table, int address, int left, int *ret_value)
+{
+    int best = 0;
+    for (int i = 0; i < the(a)->values_count; i++) {
+        const struct profile_value *v = &the(a)->values[i];
+        if (v->table != table || v->access == PROFILE_READ || first_of(a, v) != address ||
+            words(v) > left || words(v) <= best)
+            continue;
+        best = words(v);
+        *ret_value = i;
+    }
+    return best > 0;
+}
+
+static bool shared(const struct profile_value *a, const struct profile_value *b)
+{
+    return strcmp(a->shares, b->name) == 0 || strcmp(b->shares, a->name) == 0;
+}
+
+// What else lies in these registers, and is meant to, changes with them.
+static void share(const struct actor *a, int value, int address, const uint16_t *r,
+                  struct written *w)
+{
+    const struct profile_value *v = &the(a)->values[value];
+    for (int i = 0; i < the(a)->values_count; i++) {
+        const struct profile_value *other = &the(a)->values[i];
+        uint16_t own[2];
+        bool touched = false;
+        if (other->table != v->table || !shared(v, other))
+            continue;
+        for (int k = 0; k < words(other); k++) {
+            int at = first_of(a, other) + k - address;
+            bool here = at >= 0 && at < words(v);
+            own[k] = here ? r[at] : encode(&w->now, (struct cell){i, k});
+            touched = touched || here;
+        }
+        if (touched && actor_values_take(&w->now, i, decode(the(a), other, own)))
+            w->value[i] = true;
+    }
+}
+
 static int take(const struct actor *a, int table, int address, int count, const uint16_t *r,
                 struct written *ret)
 {
     for (int i = 0; i < count;) {
         struct cell c;
-        if (!find(a, table, address + i, &c))
+        int value = 0;
+        if (!find(a, table, address + i, PROFILE_WRITE, &c) ||
+            the(a)->values[c.value].access == PROFILE_READ)
             return MODBUS_BAD_ADDRESS;
-        const struct profile_value *v = &the(a)->values[c.value];
-        if (v->access == PROFILE_READ)
-            return MODBUS_BAD_ADDRESS;
-        if (c.word != 0 || i + words(v) > count)
+        if (!whole(a, table, address + i, count - i, &value))
             return MODBUS_BAD_VALUE;
-        if (!actor_values_take(&ret->now, c.value, decode(the(a), v, r + i)))
+        const struct profile_value *v = &the(a)->values[value];
+        if (!actor_values_take(&ret->now, value, decode(the(a), v, r + i)))
             return MODBUS_BAD_VALUE;
-        ret->value[c.value] = true;
+        ret->value[value] = true;
+        share(a, value, address + i, r + i, ret);
         i += words(v);
     }
     return 0;

@@ -289,6 +289,9 @@ bool actor_item(const struct actor_values *v, const char *item, int *ret_value, 
     if (s.kind != NAME || !actor_values_part(v, s.text, ret_value, &bit))
         return false;
     next(&s);
+    *ret_fits = s.kind == END;
+    if (*ret_fits)
+        return true;
     s.wrong = !is(&s, SIGN, "=");
     next(&s);
     *ret_fits = s.kind == NAME && *s.text == '$';

@@ -13,6 +13,6 @@ int actor_then(struct actor_values *v, const char *assignments, struct gon_error
 // What a text stands for beside a value (-1: none): a number, one of its words, over, or what
 // another value is. NAN: none of these.
 double actor_number(const struct actor_values *v, const char *text, int beside);
-// "speed = $speed" or "type = 1" of a Modbus write: the value that it sets, and whether what is in
-// v is what it would set ($: anything is). False: it cannot be read.
+// "speed = $speed", "type = 1" or "speed" of a Modbus write: the value that it sets, and whether
+// what is in v is what it would set ($ and a name alone: anything is). False: it cannot be read.
 bool actor_item(const struct actor_values *v, const char *item, int *ret_value, bool *ret_fits);

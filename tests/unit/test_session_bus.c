@@ -70,8 +70,6 @@ static int write_counted(void *ctx, int address, int count, const uint16_t *valu
         writes.size[i] = count;
         writes.value[i] = values[count - 1];
     }
-    if (address == 21) // the lower word alone is the same register
-        return inner.write(ctx, 20, 2, (const uint16_t[]){0, values[0]}, t_ns);
     return address == writes.stuck ? 0 : inner.write(ctx, address, count, values, t_ns);
 }
 
