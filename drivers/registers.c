@@ -36,6 +36,8 @@ int registers_address(const struct profile *p, const struct profile_value *v, in
                       struct gon_error *err)
 {
     const long address = (long)v->address - base_of(p, v->table);
+    if (v->table == PROFILE_NO_TABLE)
+        return gon_fail(err, GON_E_INPUT, "%s: has no register", v->name);
     if (v->type == PROFILE_STRING)
         return gon_fail(err, GON_E_INPUT, "%s: a text cannot be in registers", v->name);
     if (address < 0 || address + registers_count(v) - 1 > LAST_ADDRESS)

@@ -154,6 +154,10 @@ static void both_words_lie_in_the_table(void **state)
     v.address = 65535;
     assert_int_equal(registers_address(&profile, &v, &at, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "x: address 65535 is not in its table"));
+    v.table = PROFILE_NO_TABLE;
+    assert_int_equal(registers_address(&profile, &v, &at, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "no register"));
+    v.table = PROFILE_HOLDING;
     v.type = PROFILE_STRING;
     v.address = 0;
     assert_int_equal(registers_address(&profile, &v, &at, &err), GON_E_INPUT);
