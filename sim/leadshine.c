@@ -159,21 +159,21 @@ static void quick_stop(struct sim_leadshine *z, int64_t t_ns)
     z->command_steps = sim_leadshine_position_steps(z, t_ns + (int64_t)(rest_s * 1e9) + 1);
 }
 
-static int control(struct sim_leadshine *z, uint16_t value, int64_t t_ns)
+static void set_zero(struct sim_leadshine *z, int64_t t_ns)
+{
+    z->origin = motion_at(motor(z), t_ns).motor;
+    z->command_steps = 0;
+    z->homed = true;
+}
+
+static void control(struct sim_leadshine *z, uint16_t value, int64_t t_ns)
 {
     switch (value) {
-    case 0: return 0;
-    case START_PATH: run_path(z, t_ns); return 0;
-    case GO_HOME: go_home(z, t_ns); return 0;
-    case QUICK_STOP: quick_stop(z, t_ns); return 0;
-    case SET_ZERO:
-        if (is_running(z, t_ns))
-            return MODBUS_FAILURE;
-        z->origin = motion_at(motor(z), t_ns).motor;
-        z->command_steps = 0;
-        z->homed = true;
-        return 0;
-    default: return MODBUS_BAD_VALUE; // other paths are not here
+    case START_PATH: run_path(z, t_ns); break;
+    case GO_HOME: go_home(z, t_ns); break;
+    case QUICK_STOP: quick_stop(z, t_ns); break;
+    case SET_ZERO: set_zero(z, t_ns); break;
+    default: break;
     }
 }
 
@@ -234,58 +234,58 @@ int sim_leadshine_read(void *ctx, int address, int count, uint16_t *ret_register
 
 // --- writing -------------------------------------------------------------------------------------
 
-static int write_word(struct sim_leadshine *z, uint16_t value, int64_t t_ns)
+// The exception that a value gives; 0: it is taken. Other paths than 0 are not here.
+static int objection(const struct sim_leadshine *z, int address, uint16_t value, int64_t t_ns)
 {
-    if (value == RESET_WORD) {
-        z->alarm = 0;
-        return 0;
+    switch (address) {
+    case ENABLE: return value > 1 ? MODBUS_BAD_VALUE : 0;
+    case WORD:
+        if (value != RESET_WORD && value != STORE_WORD)
+            return MODBUS_BAD_VALUE;
+        return value == STORE_WORD && is_running(z, t_ns) ? MODBUS_FAILURE : 0;
+    case CONTROL:
+    case PATH_CONTROL:
+        if (value == SET_ZERO)
+            return is_running(z, t_ns) ? MODBUS_FAILURE : 0;
+        return value == 0 || value == START_PATH || value == GO_HOME || value == QUICK_STOP
+                   ? 0
+                   : MODBUS_BAD_VALUE;
+    default: return address >= PATH && address < PATH_CONTROL ? 0 : MODBUS_BAD_ADDRESS;
     }
-    if (value != STORE_WORD)
-        return MODBUS_BAD_VALUE;
-    if (is_running(z, t_ns))
-        return MODBUS_FAILURE;
-    z->busy_until_ns = t_ns + STORE_NS;
-    return 0;
 }
 
-static int write_register(struct sim_leadshine *z, int address, uint16_t value, int64_t t_ns)
+static void write_register(struct sim_leadshine *z, int address, uint16_t value, int64_t t_ns)
 {
     switch (address) {
     case ENABLE:
-        if (value > 1)
-            return MODBUS_BAD_VALUE;
         if (!value && z->enabled)
             halt(z, t_ns);
         z->enabled = value;
-        return 0;
-    case WORD: return write_word(z, value, t_ns);
+        break;
+    case WORD:
+        if (value == RESET_WORD)
+            z->alarm = 0;
+        else
+            z->busy_until_ns = t_ns + STORE_NS;
+        break;
     case CONTROL:
-    case PATH_CONTROL: return control(z, value, t_ns);
-    default: break;
+    case PATH_CONTROL: control(z, value, t_ns); break;
+    default: z->path[address - PATH] = value; break;
     }
-    if (address < PATH || address > PATH_CONTROL)
-        return MODBUS_BAD_ADDRESS;
-    z->path[address - PATH] = value;
-    return 0;
-}
-
-static bool is_writable(int address)
-{
-    return address == ENABLE || address == WORD || address == CONTROL ||
-           (address >= PATH && address <= PATH_CONTROL);
 }
 
 int sim_leadshine_write(void *ctx, int address, int count, const uint16_t *registers, int64_t t_ns)
 {
     struct sim_leadshine *z = ctx;
-    int rc = 0;
     update(z, t_ns);
-    for (int i = 0; i < count; i++)
-        if (!is_writable(address + i))
-            return MODBUS_BAD_ADDRESS;
+    for (int i = 0; i < count; i++) {
+        const int exception = objection(z, address + i, registers[i], t_ns);
+        if (exception)
+            return exception;
+    }
     if (t_ns < z->busy_until_ns)
         return MODBUS_BUSY;
-    for (int i = 0; i < count && rc == 0; i++)
-        rc = write_register(z, address + i, registers[i], t_ns);
-    return rc;
+    for (int i = 0; i < count; i++)
+        write_register(z, address + i, registers[i], t_ns);
+    return 0;
 }
