@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const bench_axis_drivers[] = {"oriental-az", "leadshine-pr", NULL};
 static const char *const regimes[] = {"underfilled", "overfilled", NULL};
 static const char *const axis_names[] = {"theta_i", "theta_r", "sample", NULL};
 
@@ -62,7 +61,8 @@ static const struct cfg_row bus_rows[] = {
 
 static const struct cfg_row axis_rows[] = {
     TEXT(bench_axis, "name", name, NULL, "\"theta_i\", \"theta_r\" or \"sample\"."),
-    CHOICE(bench_axis, "driver", driver, bench_axis_drivers, NULL, "The kind of controller."),
+    TEXT(bench_axis, "driver", driver, NULL,
+         "The controller's profile: its name (\"oriental-az\") or a path with a slash in it."),
     TEXT(bench_axis, "bus", bus, NULL, "The name of one of the buses."),
     WHOLE(bench_axis, "unit", unit, NULL, 1, 247, NULL, "The controller's address on its bus."),
     TEXT(bench_axis, "unit_name", unit_name, "\"deg\"",

@@ -28,8 +28,8 @@ struct bench_bus {
 };
 
 struct bench_axis {
-    char name[BENCH_NAME]; // "theta_i", "theta_r", "sample"
-    int driver;            // index into bench_axis_drivers
+    char name[BENCH_NAME];   // "theta_i", "theta_r", "sample"
+    char driver[BENCH_LINK]; // name or path of a profile, drivers/profile.h
     char bus[BENCH_NAME];
     int unit;                   // Modbus address
     char unit_name[8];          // "deg", "mm": what the following are in
@@ -41,7 +41,7 @@ struct bench_axis {
 };
 
 struct bench_laser {
-    char driver[BENCH_LINK]; // name or path of a profile, drivers/profile.h
+    char driver[BENCH_LINK]; // likewise
     char link[BENCH_LINK];
     double power_w;
     double warmup_s;
@@ -80,7 +80,6 @@ struct bench_config {
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides
 };
 
-extern const char *const bench_axis_drivers[];
 extern const struct cfg_row bench_config_schema[];
 
 // As campaign_config_load and campaign_config_parse.

@@ -8,7 +8,6 @@
 #include "drivers/profile.h"
 
 #include <assert.h>
-#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -127,26 +126,19 @@ enum instrument_part instrument_lost(const struct instrument *in)
     return part;
 }
 
-static void keep_first(void *ctx, const char *line)
+static int need_profile(struct profile **profile, const char *name, struct gon_error *err)
 {
-    struct gon_error *err = ctx;
-    if (!*err->text)
-        snprintf(err->text, sizeof err->text, "%s", line);
+    return *profile ? 0 : profile_open(name, NULL, profile, err);
 }
 
-// The kind of controller is the name of a profile.
 static int make_axis(struct motor *m, struct bus *bus, struct gon_error *err)
 {
-    char path[PATH_MAX];
-    struct gon_error why = {0};
-    int rc = m->profile ? 0
-                        : profile_find(bench_axis_drivers[m->config->driver], NULL, path,
-                                       sizeof path, err);
+    int rc = need_profile(&m->profile, m->config->driver, err);
     if (rc < 0)
         return rc;
-    if (!m->profile &&
-        profile_load(path, (struct cfg_sink){keep_first, &why}, &m->profile, NULL) < 0)
-        return gon_fail(err, GON_E_INPUT, "%s", why.text);
+    if (m->profile->role != PROFILE_AXIS || m->profile->protocol != PROFILE_MODBUS)
+        return gon_fail(err, GON_E_INPUT, "the profile %s is not one of an axis on a Modbus bus",
+                        m->profile->name);
     m->axis = axis_by_profile(m->profile, bus, m->config->unit);
     return m->axis ? 0 : gon_fail(err, GON_E_SYSTEM, "out of memory");
 }
@@ -182,11 +174,6 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     m->commanded = (double)NAN;
     m->seen_ns = INT64_MIN;
     return m->axis->ops->stop(m->axis, err);
-}
-
-static int need_profile(struct profile **profile, const char *name, struct gon_error *err)
-{
-    return *profile ? 0 : profile_open(name, NULL, profile, err);
 }
 
 static int connect_laser(struct instrument *in, struct gon_error *err)
