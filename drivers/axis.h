@@ -19,7 +19,7 @@ struct axis_status {
                           // it acknowledged leads, or without one where its profile is now
     bool moving, in_position, ready, homed;
     bool alarm, limit, following; // limit: stands at a limit switch; following: missed its target
-    int alarm_code; // 0: none; the text is in alarm_text
+    int alarm_code;               // 0: none; the text is in alarm_text
 };
 
 struct axis_ops {
