@@ -106,6 +106,15 @@ static int see_set(void *ctx, int value, double number, const char *text, struct
     return 0;
 }
 
+// Assignments, or a name alone: what the value is by then.
+static int see_item(struct setting *s, const char *item, const struct profile_param *params,
+                    struct gon_error *err)
+{
+    const int value = profile_value(s->p, item);
+    return value >= 0 ? see_set(s, value, 0, NULL, err)
+                      : profile_assign(s->p, item, params, see_set, s, err);
+}
+
 // One transaction is one run of registers of one table.
 static void check_transaction(struct checking *c, struct place at, const bool sets[PROFILE_VALUES])
 {
@@ -129,25 +138,13 @@ static void check_transaction(struct checking *c, struct place at, const bool se
                    registers, (unsigned)first, (unsigned)last);
 }
 
-// An assignment, or a name alone: that value as it is known.
-static int see_setting(struct setting *s, const char *text, const struct profile_param *params,
-                       struct gon_error *err)
-{
-    if (strchr(text, '='))
-        return profile_assign(s->p, text, params, see_set, s, err);
-    const int value = profile_value(s->p, text);
-    if (value < 0)
-        return gon_fail(err, GON_E_INPUT, "there is no value '%s'", text);
-    return see_set(s, value, 0, NULL, err);
-}
-
 static void check_set(struct checking *c, int i, const struct profile_write *w)
 {
     const bool moves = strcmp(w->name, c->p->axis.move) == 0;
     struct setting s = {.p = c->p};
     struct gon_error err;
     for (int k = 0; k < w->set_count; k++)
-        if (see_setting(&s, w->set[k], moves ? move_params : NULL, &err) < 0)
+        if (see_item(&s, w->set[k], moves ? move_params : NULL, &err) < 0)
             check_says(c, check_at("writes[%d].set[%d]", i, k), "%s", err.text);
     check_transaction(c, check_at("writes[%d].set", i), s.sets);
     for (int v = 0; v < c->p->values_count; v++)
