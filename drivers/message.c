@@ -180,7 +180,7 @@ static void trim_begin(const struct message *m, struct span *s)
 
 static void trim_end(const struct message *m, struct span *s)
 {
-    while (s->end > s->begin && m->in[s->end - 1] && strchr(" \t", m->in[s->end - 1]))
+    while (s->end > s->begin && m->in[s->end - 1] && strchr(" \t\r", m->in[s->end - 1]))
         s->end--;
 }
 
@@ -299,7 +299,7 @@ static int take_answer(struct message *m, const char *command, char *ret_answer,
         return unwanted_echo(m, command, err);
     if (m->have > used)
         return garbled(m, command, "two answers to one question", m->have, err);
-    if (a.begin == a.end && !given(f->echo_end) && !given(f->ok_line))
+    if (a.begin == a.end && !f->empty && !given(f->echo_end) && !given(f->ok_line))
         return garbled(m, command, "an empty answer", a.end, err);
     if (!is_printable(m->in + a.begin, a.end - a.begin))
         return garbled(m, command, "unreadable bytes in the answer (wrong baud rate?)", a.end, err);

@@ -28,6 +28,7 @@ struct message_format {
     const char *echo_end;    // the device repeats the command, then this, then the answer: is
                              // checked and cut off. NULL or "": it must not repeat anything
     const char *ok_line;     // follows each answer as a line of its own; NULL or "": none
+    bool empty;              // an empty line is an answer, too
     bool (*alone)(const void *ctx, const char *line); // a line (error) without an ok_line; or NULL
     const void *ctx;
     const struct profile_checksum *checksum; // of commands and answers; NULL: none

@@ -102,6 +102,7 @@ struct profile_value {
     struct profile_bit bits[PROFILE_BITS]; // of a whole number
     int bits_count;
     char valid[PROFILE_TEXT]; // condition: where it does not hold the value is unknown
+    bool changes;             // never twice the same (a time stamp): then it is an old answer
     char help[PROFILE_TEXT];
     // Modbus
     int table;                 // enum profile_table
@@ -119,6 +120,7 @@ struct profile_framing {
     char end_out[8], end_in[8];
     char echo_end[8]; // the device repeats the command, then this; "": no echo
     char ok_line[16]; // a line that follows each good answer; "": none
+    bool empty;       // an empty line is an answer, too
     double gap_ms, timeout_ms, quiet_ms;
     char sync[PROFILE_NAME]; // exchange whose answer is known: gets into step again
 };

@@ -131,6 +131,16 @@ static bool is_believed(const struct profile *p, const struct profile_exchange *
     return profile_when(p, x->believe, now);
 }
 
+static bool is_repeated(const struct profile *p, const struct profile_data *then,
+                        const struct profile_data *now, const bool fresh[PROFILE_VALUES])
+{
+    for (int i = 0; i < p->values_count; i++)
+        if (p->values[i].changes && fresh[i] && then->known[i] && now->known[i] &&
+            now->number[i] == then->number[i])
+            return true;
+    return false;
+}
+
 static int read_answer(struct text_session *t, const struct profile_exchange *x,
                        const char *command, const char *answer, struct gon_error *err)
 {
@@ -150,6 +160,8 @@ static int read_answer(struct text_session *t, const struct profile_exchange *x,
     session_doubt(p, &now, fresh);
     if (!is_believed(p, x, &now))
         return nonsense(t, command, answer, "that cannot be", err);
+    if (is_repeated(p, &s->data, &now, fresh))
+        return nonsense(t, command, answer, "that is the last answer once more", err);
     s->data = now;
     session_saw(s, fresh);
     if (t->learning && x == t->sync)
@@ -438,6 +450,7 @@ static void set_format(struct text_session *t, const struct profile *p)
         .sync_begins = t->sync_begins,
         .echo_end = f->echo_end,
         .ok_line = f->ok_line,
+        .empty = f->empty,
         .alone = is_refusal,
         .ctx = p,
         .checksum = p->checksum.kind == PROFILE_NO_SUM ? NULL : &p->checksum,
