@@ -316,7 +316,8 @@ static const char leased[] =
     "  on = ( { send = \"on\"; } ); off = ( \"\\roff\" ); off_asks = ( \"on?\" ); is_off = \"on = "
     "0\";\n"
     "  keepalive: { send = \"alive\"; period_ms = 1000; }; };\n"
-    "simulate: { drift = ( { value = \"left_s\"; to = \"0\"; rate = 1; then = \"on = 0\"; } ); };\n";
+    "simulate: { drift = ( { value = \"left_s\"; to = \"0\"; rate = 1; then = \"on = 0\"; } ); "
+    "};\n";
 
 static void its_own_lease_is_renewed_in_time_and_not_more_often(void **state)
 {

@@ -44,10 +44,10 @@ static void it_says_who_it_is(void **state)
 {
     static const struct {
         const char *profile, *says;
-    } rows[] = {{"thorlabs-sc10", "THORLABS SC10 VERSION 1.07"},
-                {"thorlabs-mc2000b", "THORLABS MC2000B, 400 Hz"},
-                {"thorlabs-fw102c",
-                 "THORLABS FW102C/FW212C Filter Wheel version 1.04, 6 positions"}};
+    } rows[] = {
+        {"thorlabs-sc10", "THORLABS SC10 VERSION 1.07"},
+        {"thorlabs-mc2000b", "THORLABS MC2000B, 400 Hz"},
+        {"thorlabs-fw102c", "THORLABS FW102C/FW212C Filter Wheel version 1.04, 6 positions"}};
     char text[120];
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
