@@ -2,6 +2,7 @@
 // uses: drivers sim model base
 #include "drivers/message.h"
 
+#include "drivers/checksum.h"
 #include "tests/unit/vline.h"
 
 #include <locale.h>
@@ -24,18 +25,25 @@ static const struct message_format format = {
     .sync_begins = "counter",
 };
 
+static struct message *begin_as(struct scripted *s, const struct message_format *as,
+                                void (*hear)(struct scripted *, const char *, int64_t),
+                                const struct cancel *cancel)
+{
+    struct transport *t;
+    struct gon_error err;
+    scripted_init(s, as->end_out, hear);
+    struct clk *clk = vline_begin(&s->port);
+    assert_int_equal(transport_open(vline.link, clk, cancel, &t, &err), 0);
+    struct message *m = message_new(t, as);
+    assert_non_null(m);
+    return m;
+}
+
 static struct message *begin(struct scripted *s,
                              void (*hear)(struct scripted *, const char *, int64_t),
                              const struct cancel *cancel)
 {
-    struct transport *t;
-    struct gon_error err;
-    scripted_init(s, "\r", hear);
-    struct clk *clk = vline_begin(&s->port);
-    assert_int_equal(transport_open(vline.link, clk, cancel, &t, &err), 0);
-    struct message *m = message_new(t, &format);
-    assert_non_null(m);
-    return m;
+    return begin_as(s, &format, hear, cancel);
 }
 
 static void count(struct scripted *s, const char *line, char text[64])
@@ -381,6 +389,127 @@ static void asking_again_is_bounded(void **state)
     message_free(m);
 }
 
+// --- what stands around answers ------------------------------------------------------------------
+
+// Says what stands in the table, bit by bit: each part 3 ms after the one before.
+static const char *const *replies; // command, answer, ..., NULL
+
+static void hear_replies(struct scripted *s, const char *line, int64_t t_ns)
+{
+    for (int i = 0; replies[i]; i += 2)
+        if (strcmp(line, replies[i]) == 0)
+            for (const char *c = replies[i + 1]; *c; c++)
+                port_send(&s->port, c, 1, t_ns + MS(3) + (int64_t)(c - replies[i + 1]) * MS(1));
+}
+
+static void an_echo_with_a_prompt_is_cut_off(void **state)
+{
+    static const struct message_format prompt = {.end_out = "\r",
+                                                 .end_in = "\r> ",
+                                                 .timeout_ns = MS(100),
+                                                 .quiet_ns = MS(350),
+                                                 .echo_end = "\r"};
+    static const char *const says[] = {"freq?", "freq?\r400\r> ", "freq=400", "freq=400\r> ",
+                                       "late?", "freq?\r400\r> ", NULL};
+    struct scripted s;
+    char answer[32];
+    struct gon_error err;
+    (void)state;
+    replies = says;
+    struct message *m = begin_as(&s, &prompt, hear_replies, NULL);
+    assert_int_equal(message_query(m, "freq?", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, "400");
+    assert_int_equal(message_query(m, "freq=400", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, ""); // done, nothing to say
+    // An answer to another question shows by its echo.
+    assert_int_equal(message_query(m, "late?", answer, sizeof answer, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "does not repeat the command"));
+    message_free(m);
+}
+
+static bool is_error(const void *ctx, const char *line)
+{
+    (void)ctx;
+    return strncmp(line, "ERR", 3) == 0;
+}
+
+static void a_line_that_says_ok_belongs_to_each_answer(void **state)
+{
+    static const struct message_format confirmed = {.end_out = "\r\n",
+                                                    .end_in = "\r\n",
+                                                    .timeout_ns = MS(100),
+                                                    .quiet_ns = MS(350),
+                                                    .ok_line = "OK",
+                                                    .alone = is_error};
+    static const char *const says[] = {"p?",   "0.02\r\nOK\r\n", "p 1",  "OK\r\n",
+                                       "bad",  "ERR-100\r\n",    "two?", "1\r\n2\r\n",
+                                       "one?", "1\r\n",          NULL};
+    struct scripted s;
+    char answer[32];
+    struct gon_error err;
+    (void)state;
+    replies = says;
+    struct message *m = begin_as(&s, &confirmed, hear_replies, NULL);
+    assert_int_equal(message_query(m, "p?", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, "0.02");
+    assert_int_equal(message_query(m, "p 1", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, "");
+    assert_int_equal(message_query(m, "bad", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, "ERR-100"); // without an OK
+    assert_int_equal(message_query(m, "two?", answer, sizeof answer, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "does not say OK"));
+    assert_int_equal(message_query(m, "one?", answer, sizeof answer, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "breaks off"));
+    message_free(m);
+}
+
+static void an_empty_line_is_an_answer_only_where_it_is_said(void **state)
+{
+    static const char *const says[] = {"go", "\r\n", "id?", "counter 7\r\n", NULL};
+    struct message_format empty = format;
+    struct scripted s;
+    char answer[32] = "kept";
+    struct gon_error err;
+    (void)state;
+    replies = says;
+    struct message *m = begin_as(&s, &format, hear_replies, NULL);
+    assert_int_equal(message_query(m, "go", answer, sizeof answer, &err), GON_E_LINK);
+    message_free(m);
+    empty.empty = true;
+    m = begin_as(&s, &empty, hear_replies, NULL);
+    assert_int_equal(message_query(m, "go", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, "");
+    message_free(m);
+}
+
+// 0xB7 is the sum of "x?", 0x31 that of "1".
+static void checksums_are_sent_and_checked(void **state)
+{
+    static const struct profile_checksum sum = {
+        .kind = PROFILE_SUM, .width = 8, .form = PROFILE_HEX_UPPER, .before = "*"};
+    static const char *const right[] = {"x?*B7", "1*31\r\n", NULL};
+    static const char *const wrong[] = {"x?*B7", "1*32\r\n", NULL};
+    static const char *const missing[] = {"x?*B7", "1\r\n", NULL};
+    const struct message_format summed = {.end_out = "\r",
+                                          .end_in = "\r\n",
+                                          .timeout_ns = MS(100),
+                                          .quiet_ns = MS(350),
+                                          .checksum = &sum};
+    struct scripted s;
+    char answer[32] = "";
+    struct gon_error err;
+    (void)state;
+    replies = right;
+    struct message *m = begin_as(&s, &summed, hear_replies, NULL);
+    assert_int_equal(message_query(m, "x?", answer, sizeof answer, &err), 0);
+    assert_string_equal(answer, "1");
+    replies = wrong;
+    assert_int_equal(message_query(m, "x?", answer, sizeof answer, &err), GON_E_LINK);
+    replies = missing;
+    assert_int_equal(message_query(m, "x?", answer, sizeof answer, &err), GON_E_LINK);
+    message_free(m);
+}
+
 // --- many readings under faults ------------------------------------------------------------------
 
 static uint64_t dice;
@@ -528,6 +657,10 @@ int main(void)
         cmocka_unit_test(nothing_waits_long_without_a_turn),
         cmocka_unit_test(a_line_that_never_falls_silent_is_given_up),
         cmocka_unit_test(asking_again_is_bounded),
+        cmocka_unit_test(an_echo_with_a_prompt_is_cut_off),
+        cmocka_unit_test(a_line_that_says_ok_belongs_to_each_answer),
+        cmocka_unit_test(an_empty_line_is_an_answer_only_where_it_is_said),
+        cmocka_unit_test(checksums_are_sent_and_checked),
         cmocka_unit_test(no_wrong_value_under_faults),
         cmocka_unit_test(numbers_as_instruments_write_them),
         cmocka_unit_test(what_is_no_number_is_an_error),
