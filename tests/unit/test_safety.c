@@ -177,6 +177,50 @@ static void the_longest_silence_while_on_is_known(void **state)
     safety_free(s);
 }
 
+// A laser that goes off by itself when nobody renews its lease.
+static int renewed;
+
+static int renew(struct laser *l, struct gon_error *err)
+{
+    (void)l;
+    (void)err;
+    renewed++;
+    return 0;
+}
+
+static void the_lasers_own_lease_is_renewed_while_it_may_emit_and_never_else(void **state)
+{
+    (void)state;
+    struct simbench b;
+    struct safety *s = begin(&b);
+    struct laser_ops ops = *b.laser.ops;
+    struct cancel *stop = cancel_new();
+    ops.keep_alive = renew;
+    b.laser.ops = &ops;
+    renewed = 0;
+    safety_obey(s, stop);
+    assert_int_equal(safety_begin(s, NULL, 0, NULL), 0);
+    safety_permit(s, true);
+    safety_tick(s);
+    assert_int_equal(renewed, 0); // it is off
+    assert_int_equal(safety_on(s, NULL), 0);
+    safety_tick(s);
+    safety_tick(s);
+    assert_int_equal(renewed, 2);
+    cancel_request(stop);
+    safety_tick(s);
+    assert_int_equal(renewed, 2); // it shall go off
+    safety_obey(s, NULL);
+    b.world.laser.state = SIM_LASER_COMPLETED;
+    b.world.laser.ignores_off = true;
+    assert_int_equal(safety_off(s, NULL), GON_E_DEVICE);
+    safety_tick(s);
+    assert_int_equal(renewed, 2); // and most of all now
+    b.world.laser.ignores_off = false;
+    safety_free(s);
+    cancel_free(stop);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -188,6 +232,7 @@ int main(void)
         cmocka_unit_test(a_laser_that_is_gone_stays_pending_until_it_is_back_and_off),
         cmocka_unit_test(a_stop_is_due_once_and_not_within_a_call),
         cmocka_unit_test(the_longest_silence_while_on_is_known),
+        cmocka_unit_test(the_lasers_own_lease_is_renewed_while_it_may_emit_and_never_else),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
