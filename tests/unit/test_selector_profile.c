@@ -151,6 +151,19 @@ static void a_stuck_shutter_is_told_once_and_is_an_error(void **state)
     z->ops->free(z);
 }
 
+static void one_that_takes_too_long_is_not_told_again(void **state)
+{
+    struct gon_error err;
+    (void)state;
+    struct selector *z = begin("thorlabs-mc2000b");
+    profiled_do("frequency_hz = 20000"); // 100 s until it is locked
+    const int64_t start_ns = vline.clk.t_ns;
+    assert_int_equal(z->ops->go(z, selector_find(z, "running"), &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "'running' in 20 s, it is at none of its positions"));
+    assert_true(vline.clk.t_ns - start_ns < CLK_S(21));
+    z->ops->free(z);
+}
+
 // The answer to "ens" is lost, with or without the command itself.
 static void a_lost_answer_is_no_reason_to_change_over_again(void **state)
 {
@@ -229,6 +242,7 @@ int main(void)
         cmocka_unit_test(every_position_is_reached),
         cmocka_unit_test(it_is_waited_for),
         cmocka_unit_test(a_stuck_shutter_is_told_once_and_is_an_error),
+        cmocka_unit_test(one_that_takes_too_long_is_not_told_again),
         cmocka_unit_test(a_lost_answer_is_no_reason_to_change_over_again),
         cmocka_unit_test(a_lost_command_is_told_again_after_a_look),
         cmocka_unit_test(on_a_bad_line_it_never_claims_what_is_not_so),

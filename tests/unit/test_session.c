@@ -204,7 +204,8 @@ static void an_exchange_has_its_own_patience(void **state)
     struct gon_error err;
     (void)state;
     struct session *z = begin_with(&s, HEAD VALUES FRAMING EXCHANGES, hear_slowly);
-    assert_int_equal(session_ask_one(z, "slow", &err), 0);
+    const struct profile_asks slow = {.name = {"slow"}, .count = 1};
+    assert_int_equal(session_ask_once(z, &slow, &err), 0);
     assert_true(session_number(z, "x") == 7);
     const struct profile_asks x = {.name = {"x"}, .count = 1};
     assert_int_equal(session_ask_once(z, &x, &err), GON_E_LINK);
