@@ -7,6 +7,7 @@
 #include "cli/out.h"
 #include "cli/verb.h"
 #include "drivers/link.h"
+#include "drivers/profile.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -73,8 +74,10 @@ static void quiet(void *ctx, const char *line)
 // "campaign", "bench" or "simulator", by a group that only files of that kind have; NULL: not seen.
 static const char *kind_of(const char *path)
 {
-    static const char *const signs[][2] = {{"campaign", "campaign"}, {"bench", "bench"},
-                                           {"sample", "simulator"},  {"optics", "simulator"},
+    static const char *const signs[][2] = {{"campaign", "campaign"},
+                                           {"bench", "bench"},
+                                           {"sample", "simulator"},
+                                           {"optics", "simulator"},
                                            {"wires", "simulator"}};
     struct cfg_file *f = cfg_open(path, (struct cfg_sink){quiet, NULL});
     const char *text = f ? cfg_text(f) : "", *kind = NULL;
@@ -133,6 +136,33 @@ static int check_link(const char *path, const char *text, const char *link, enum
     return rc;
 }
 
+static int check_role(const char *name, enum profile_role role, struct gon_error *err)
+{
+    struct profile *p;
+    int rc = profile_open(name, NULL, &p, err);
+    if (rc < 0)
+        return rc;
+    if (p->role != (int)role)
+        rc = gon_fail(err, GON_E_INPUT, "profile %s is of a %s, not of a %s", name,
+                      profile_roles[p->role], profile_roles[role]);
+    free(p);
+    return rc;
+}
+
+// A device's profile has to be there, right, and of such a device.
+static int check_profile(const char *path, const char *text, const char *name,
+                         enum profile_role role, struct cfg_sink sink)
+{
+    struct gon_error err;
+    char line[800];
+    int rc = check_role(name, role, &err);
+    if (rc >= 0)
+        return 0;
+    snprintf(line, sizeof line, "%s:%d: driver: %s", path, line_of(text, name), err.text);
+    sink.say(sink.ctx, line);
+    return rc;
+}
+
 static int load_bench(const char *path, struct bench_config *bench, struct cfg_sink sink)
 {
     char *text;
@@ -140,6 +170,10 @@ static int load_bench(const char *path, struct bench_config *bench, struct cfg_s
     if (rc < 0)
         return rc;
     worst = check_link(path, text, bench->laser.link, LINK_TEXT, sink);
+    if ((rc = check_profile(path, text, bench->laser.driver, PROFILE_LASER, sink)) < 0)
+        worst = rc;
+    if ((rc = check_profile(path, text, bench->detector.driver, PROFILE_DETECTOR, sink)) < 0)
+        worst = rc;
     for (int i = 0; i < bench->buses_count; i++)
         if ((rc = check_link(path, text, bench->buses[i].link, LINK_MODBUS, sink)) < 0)
             worst = rc;
