@@ -126,14 +126,15 @@ enum instrument_part instrument_lost(const struct instrument *in)
     return part;
 }
 
-static int need_profile(struct profile **profile, const char *name, struct gon_error *err)
+static int need_profile(struct instrument *in, struct profile **profile, const char *name,
+                        struct gon_error *err)
 {
-    return *profile ? 0 : profile_open(name, NULL, profile, err);
+    return *profile ? 0 : profile_open(name, in->bench->folder, profile, err);
 }
 
-static int make_axis(struct motor *m, struct bus *bus, struct gon_error *err)
+static int make_axis(struct instrument *in, struct motor *m, struct bus *bus, struct gon_error *err)
 {
-    int rc = need_profile(&m->profile, m->config->driver, err);
+    int rc = need_profile(in, &m->profile, m->config->driver, err);
     if (rc < 0)
         return rc;
     if (m->profile->role != PROFILE_AXIS || m->profile->protocol != PROFILE_MODBUS)
@@ -150,7 +151,7 @@ static int connect_bus(struct instrument *in, struct motor *m, struct gon_error 
     int rc = *bus ? bus_reopen(*bus, err)
                   : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL,
                              bus, err);
-    return rc >= 0 && !m->axis ? make_axis(m, *bus, err) : rc;
+    return rc >= 0 && !m->axis ? make_axis(in, m, *bus, err) : rc;
 }
 
 // Units share their bus: the bus is only reopened when the unit does not answer on it as it is.
@@ -159,7 +160,7 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     struct motor *m = &in->motor[part];
     int rc = 0;
     if (!m->axis && m->bus >= 0 && in->bus[m->bus])
-        rc = make_axis(m, in->bus[m->bus], err);
+        rc = make_axis(in, m, in->bus[m->bus], err);
     if (rc < 0)
         return rc;
     rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
@@ -182,7 +183,7 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = need_profile(&in->laser_profile, in->bench->laser.driver, err);
+    int rc = need_profile(in, &in->laser_profile, in->bench->laser.driver, err);
     if (rc == 0)
         rc = laser_by_profile(in->laser_profile, p->address, &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
@@ -205,8 +206,9 @@ int instrument_write_set_up(struct instrument *in, struct gon_error *err)
 static int connect_detector(struct instrument *in, struct gon_error *err)
 {
     struct part_state *p = &in->part[PART_DETECTOR];
-    int rc = in->detector ? in->detector->ops->reopen(in->detector, err)
-                          : need_profile(&in->detector_profile, in->bench->detector.driver, err);
+    int rc = in->detector
+                 ? in->detector->ops->reopen(in->detector, err)
+                 : need_profile(in, &in->detector_profile, in->bench->detector.driver, err);
     if (rc >= 0 && !in->detector)
         rc = detector_by_profile(in->detector_profile, p->address, &in->breathing.clk, NULL,
                                  &in->detector, err);
