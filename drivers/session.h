@@ -6,9 +6,10 @@
 //
 // What comes is believed only when it fits its pattern, lies in its range and holds to the
 // exchange's "believe" (as far as all values in that are known); otherwise the link is out of step
-// and it is asked again, up to 3 times. A setting is sent once; what verifies it is asked
-// afterwards. Neighbouring Modbus reads get different lengths, so that a late answer fails its
-// length check. Thread: the instrument's.
+// and it is asked again, up to 3 times. A setting is sent once, and what verifies it is
+// asked afterwards; where its answer was lost and the read-back shows that it did not arrive, it is
+// sent up to 2 times more. Neighbouring Modbus reads get different lengths, so that a late answer
+// fails its length check. Thread: the instrument's.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"

@@ -161,20 +161,47 @@ static int verify(struct text_session *t, const struct profile_exchange *x, cons
     return rc < 0 ? rc : compare(t, x, back->answer, w, err);
 }
 
-// Sent once. Where its answer was lost the read-back tells whether it arrived.
-static int tell(struct text_session *t, const struct profile_exchange *x, const struct wish *w,
-                struct gon_error *err)
+// Where the answer was lost the read-back tells whether the command arrived: GON_E_LINK, it did
+// not.
+static int tell_once(struct text_session *t, const struct profile_exchange *x, const struct wish *w,
+                     struct gon_error *err)
 {
-    int rc = text_exchange(t, x, err);
+    struct gon_error why = {0};
+    int rc = text_exchange(t, x, &why);
     const bool lost = rc == GON_E_LINK && *x->verify;
     if (rc < 0 && !lost)
-        return rc;
+        return gon_fail(err, rc, "%s", why.text);
     rc = text_pause(t, CLK_S(x->settle_ms * 1e-3), err);
     if (rc == 0 && x->echoes && !lost)
         rc = compare(t, x, x->answer, w, err);
     else if (rc == 0 && *x->verify)
         rc = verify(t, x, w, err);
+    if (lost && (rc == GON_E_DEVICE || rc == GON_E_REFUSED))
+        return gon_fail(err, GON_E_LINK, "%s", why.text);
     return rc == 0 && x->check ? text_check_errors(t, x, err) : rc;
+}
+
+static void put_back(struct profile_data *d, const struct wish *w)
+{
+    for (int i = 0; i < PROFILE_VALUES; i++) {
+        if (!w->sent[i])
+            continue;
+        d->known[i] = w->data.known[i];
+        d->number[i] = w->data.number[i];
+        memcpy(d->text[i], w->data.text[i], sizeof d->text[i]);
+    }
+}
+
+// Sent again only when it was seen that it did not arrive.
+static int tell(struct text_session *t, const struct profile_exchange *x, const struct wish *w,
+                struct gon_error *err)
+{
+    int rc = tell_once(t, x, w, err);
+    for (int i = 1; i < TEXT_TRIES && rc == GON_E_LINK && *x->verify; i++) {
+        put_back(&t->session.data, w);
+        rc = tell_once(t, x, w, err);
+    }
+    return rc;
 }
 
 int text_send(struct session *s, const char *name, const struct profile_param *params,

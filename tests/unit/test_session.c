@@ -236,7 +236,7 @@ static void a_setting_is_read_back(void **state)
 }
 
 // The answer to a setting is lost: it is not sent again, the read-back tells.
-static void a_setting_is_sent_once(void **state)
+static void a_setting_is_sent_once_when_only_its_answer_is_lost(void **state)
 {
     static const char *const ways[] = {"set_level", "set_echoed"};
     struct scripted s;
@@ -248,14 +248,45 @@ static void a_setting_is_sent_once(void **state)
         session_put(z, "level", 12.5);
         assert_int_equal(session_send(z, ways[echoed], NULL, &err), 0);
         assert_int_equal(s.heard, 2); // the setting without an answer, and "l?"
-        session_put(z, "level", 80);
-        assert_int_equal(session_send(z, ways[echoed], NULL, &err), GON_E_DEVICE);
         session_free(z);
     }
     struct session *z = begin(&s);
     assert_int_equal(session_send(z, "go", NULL, &err), GON_E_LINK); // nothing reads it back
     assert_int_equal(s.heard, 1);
     session_free(z);
+}
+
+// The command itself gets lost step times.
+static void hear_at_last(struct scripted *s, const char *command, int64_t t_ns)
+{
+    static char level[16];
+    char text[32];
+    if (s->heard == 1)
+        snprintf(level, sizeof level, "1.00");
+    if (strncmp(command, "l ", 2) == 0 && s->step-- > 0)
+        return;
+    if (strncmp(command, "l ", 2) == 0)
+        snprintf(level, sizeof level, "%.10s", command + 2);
+    snprintf(text, sizeof text, "%s\r\n", strcmp(command, "l?") == 0 ? level : "OK");
+    scripted_say(s, text, t_ns + MS(5));
+}
+
+static void a_setting_that_did_not_arrive_is_sent_again(void **state)
+{
+    (void)state;
+    for (int lost = 1; lost <= 3; lost++) {
+        struct scripted s;
+        struct gon_error err;
+        struct session *z = begin_with(&s, HEAD VALUES FRAMING EXCHANGES, hear_at_last);
+        s.step = lost;
+        session_put(z, "level", 80);
+        assert_int_equal(session_send(z, "set_level", NULL, &err), lost < 3 ? 0 : GON_E_LINK);
+        if (lost < 3)
+            assert_true(session_number(z, "level") == 80);
+        else
+            assert_non_null(strstr(err.text, "'l 80.00': no answer"));
+        session_free(z);
+    }
 }
 
 static void an_echo_of_something_else_is_a_refusal(void **state)
@@ -502,7 +533,8 @@ int main(void)
         cmocka_unit_test(a_value_that_means_nothing_now_is_unknown),
         cmocka_unit_test(an_exchange_has_its_own_patience),
         cmocka_unit_test(a_setting_is_read_back),
-        cmocka_unit_test(a_setting_is_sent_once),
+        cmocka_unit_test(a_setting_is_sent_once_when_only_its_answer_is_lost),
+        cmocka_unit_test(a_setting_that_did_not_arrive_is_sent_again),
         cmocka_unit_test(an_echo_of_something_else_is_a_refusal),
         cmocka_unit_test(refusals_mean_something),
         cmocka_unit_test(busy_is_waited_out),
