@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -285,12 +286,21 @@ static int take(struct cfg_file *f, struct bench_config *ret_bench, char **ret_t
     return GON_OK;
 }
 
+static void keep_folder(const char *path, char *folder)
+{
+    const char *slash = strrchr(path, '/');
+    const size_t size = !slash ? 0 : slash == path ? 1 : (size_t)(slash - path);
+    snprintf(folder, BENCH_FOLDER, "%.*s", (int)size, path);
+}
+
 int bench_config_load(const char *path, struct cfg_sink sink, struct bench_config *ret_bench,
                       char **ret_text)
 {
     struct cfg_file *f = cfg_open(path, sink);
     int rc = take(f, ret_bench, ret_text);
     cfg_close(f);
+    if (rc >= 0)
+        keep_folder(path, ret_bench->folder);
     return rc;
 }
 

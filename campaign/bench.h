@@ -64,6 +64,7 @@ struct bench_station {
 };
 
 struct bench_config {
+    char folder[BENCH_FOLDER]; // of the file, where its profiles may be; "": here
     char name[64];
     double wavelength_nm;
     int regime;                                      // enum bench_regime

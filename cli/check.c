@@ -136,10 +136,11 @@ static int check_link(const char *path, const char *text, const char *link, enum
     return rc;
 }
 
-static int check_role(const char *name, enum profile_role role, struct gon_error *err)
+static int check_role(const struct bench_config *bench, const char *name, enum profile_role role,
+                      struct gon_error *err)
 {
     struct profile *p;
-    int rc = profile_open(name, NULL, &p, err);
+    int rc = profile_open(name, bench->folder, &p, err);
     if (rc < 0)
         return rc;
     if (p->role != (int)role)
@@ -150,12 +151,12 @@ static int check_role(const char *name, enum profile_role role, struct gon_error
 }
 
 // A device's profile has to be there, right, and of such a device.
-static int check_profile(const char *path, const char *text, const char *name,
-                         enum profile_role role, struct cfg_sink sink)
+static int check_profile(const char *path, const char *text, const struct bench_config *bench,
+                         const char *name, enum profile_role role, struct cfg_sink sink)
 {
     struct gon_error err;
     char line[800];
-    int rc = check_role(name, role, &err);
+    int rc = check_role(bench, name, role, &err);
     if (rc >= 0)
         return 0;
     snprintf(line, sizeof line, "%s:%d: driver: %s", path, line_of(text, name), err.text);
@@ -170,9 +171,9 @@ static int load_bench(const char *path, struct bench_config *bench, struct cfg_s
     if (rc < 0)
         return rc;
     worst = check_link(path, text, bench->laser.link, LINK_TEXT, sink);
-    if ((rc = check_profile(path, text, bench->laser.driver, PROFILE_LASER, sink)) < 0)
+    if ((rc = check_profile(path, text, bench, bench->laser.driver, PROFILE_LASER, sink)) < 0)
         worst = rc;
-    if ((rc = check_profile(path, text, bench->detector.driver, PROFILE_DETECTOR, sink)) < 0)
+    if ((rc = check_profile(path, text, bench, bench->detector.driver, PROFILE_DETECTOR, sink)) < 0)
         worst = rc;
     for (int i = 0; i < bench->buses_count; i++)
         if ((rc = check_link(path, text, bench->buses[i].link, LINK_MODBUS, sink)) < 0)

@@ -126,14 +126,15 @@ enum instrument_part instrument_lost(const struct instrument *in)
     return part;
 }
 
-static int need_profile(struct profile **profile, const char *name, struct gon_error *err)
+static int need_profile(struct instrument *in, struct profile **profile, const char *name,
+                        struct gon_error *err)
 {
-    return *profile ? 0 : profile_open(name, NULL, profile, err);
+    return *profile ? 0 : profile_open(name, in->bench->folder, profile, err);
 }
 
 static int make_axis(struct motor *m, struct bus *bus, struct gon_error *err)
 {
-    int rc = need_profile(&m->profile, m->config->driver, err);
+    int rc = need_profile(in, &m->profile, m->config->driver, err);
     if (rc < 0)
         return rc;
     if (m->profile->role != PROFILE_AXIS || m->profile->protocol != PROFILE_MODBUS)
@@ -182,7 +183,7 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = need_profile(&in->laser_profile, in->bench->laser.driver, err);
+    int rc = need_profile(in, &in->laser_profile, in->bench->laser.driver, err);
     if (rc == 0)
         rc = laser_by_profile(in->laser_profile, p->address, &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
@@ -205,8 +206,9 @@ int instrument_write_set_up(struct instrument *in, struct gon_error *err)
 static int connect_detector(struct instrument *in, struct gon_error *err)
 {
     struct part_state *p = &in->part[PART_DETECTOR];
-    int rc = in->detector ? in->detector->ops->reopen(in->detector, err)
-                          : need_profile(&in->detector_profile, in->bench->detector.driver, err);
+    int rc = in->detector
+                 ? in->detector->ops->reopen(in->detector, err)
+                 : need_profile(in, &in->detector_profile, in->bench->detector.driver, err);
     if (rc >= 0 && !in->detector)
         rc = detector_by_profile(in->detector_profile, p->address, &in->breathing.clk, NULL,
                                  &in->detector, err);

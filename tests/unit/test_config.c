@@ -186,6 +186,19 @@ static void polarisations_have_names(void **state)
     assert_string_equal(polarisation_name(POL_UNKNOWN), "unknown");
 }
 
+static void a_bench_remembers_its_folder_and_profiles(void **state)
+{
+    struct bench_config b;
+    char *text;
+    (void)state;
+    assert_int_equal(bench_config_load("configs/goniod.cfg", (struct cfg_sink){0}, &b, &text), 0);
+    assert_string_equal(b.folder, "configs");
+    assert_string_equal(b.laser.driver, "cobolt-05");
+    assert_string_equal(b.detector.driver, "sr830");
+    assert_string_equal(fixture_bench().folder, "");
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -197,6 +210,7 @@ int main(void)
         cmocka_unit_test(a_benchs_mistakes_name_their_lines),
         cmocka_unit_test(the_lasers_polarisation_must_be_said),
         cmocka_unit_test(polarisations_have_names),
+        cmocka_unit_test(a_bench_remembers_its_folder_and_profiles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
