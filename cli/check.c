@@ -171,6 +171,9 @@ static int load_bench(const char *path, struct bench_config *bench, struct cfg_s
     if (rc < 0)
         return rc;
     worst = check_link(path, text, bench->laser.link, LINK_TEXT, sink);
+    for (int i = 0; i < bench->axes_count; i++)
+        if ((rc = check_profile(path, text, bench, bench->axes[i].driver, PROFILE_AXIS, sink)) < 0)
+            worst = rc;
     if ((rc = check_profile(path, text, bench, bench->laser.driver, PROFILE_LASER, sink)) < 0)
         worst = rc;
     if ((rc = check_profile(path, text, bench, bench->detector.driver, PROFILE_DETECTOR, sink)) < 0)
