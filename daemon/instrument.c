@@ -132,7 +132,7 @@ static int need_profile(struct instrument *in, struct profile **profile, const c
     return *profile ? 0 : profile_open(name, in->bench->folder, profile, err);
 }
 
-static int make_axis(struct motor *m, struct bus *bus, struct gon_error *err)
+static int make_axis(struct instrument *in, struct motor *m, struct bus *bus, struct gon_error *err)
 {
     int rc = need_profile(in, &m->profile, m->config->driver, err);
     if (rc < 0)
@@ -151,7 +151,7 @@ static int connect_bus(struct instrument *in, struct motor *m, struct gon_error 
     int rc = *bus ? bus_reopen(*bus, err)
                   : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL,
                              bus, err);
-    return rc >= 0 && !m->axis ? make_axis(m, *bus, err) : rc;
+    return rc >= 0 && !m->axis ? make_axis(in, m, *bus, err) : rc;
 }
 
 // Units share their bus: the bus is only reopened when the unit does not answer on it as it is.
@@ -160,7 +160,7 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     struct motor *m = &in->motor[part];
     int rc = 0;
     if (!m->axis && m->bus >= 0 && in->bus[m->bus])
-        rc = make_axis(m, in->bus[m->bus], err);
+        rc = make_axis(in, m, in->bus[m->bus], err);
     if (rc < 0)
         return rc;
     rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
