@@ -237,6 +237,6 @@ void actor_text_unglob(const char *glob, char *ret_text, size_t size)
     struct out o = {.text = ret_text, .size = size};
     for (; *glob; glob++)
         if (*glob != '*')
-            put(&o, *glob == '?' ? '0' : *glob);
+            put(&o, *glob);
     ret_text[o.used] = 0;
 }

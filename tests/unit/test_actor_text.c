@@ -138,6 +138,9 @@ static void answers_are_written_as_printf_would(void **state)
     assert_string_equal(little, "Rum");
     actor_text_unglob("*syntax error?*", little, sizeof little);
     assert_string_equal(little, "syn");
+    char all[40];
+    actor_text_unglob("*syntax error?*", all, sizeof all);
+    assert_string_equal(all, "syntax error?");
     free(f.p);
 }
 
