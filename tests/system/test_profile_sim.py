@@ -35,6 +35,9 @@ exchanges: (
   { name = "on"; send = "ON"; then = "lit = 1"; },
   { name = "off"; send = "OFF"; then = "lit = 0"; } );
 refusals: ( { like = "what?*"; } );
+laser: { status = ( "lit", "power" ); light = ( "lit" ); emitting = "lit = 1";
+  states = ( { when = "lit = 1"; is = "emitting"; }, { is = "off"; } );
+  on = ( { send = "on"; } ); off = ( "\rOFF" ); off_asks = ( "lit" ); is_off = "lit = 0"; };
 simulate: {
   start = ( { value = "model"; is = "Lamp 3"; }, { value = "asked_w"; is = "1"; } );
   drift = ( { value = "power_w"; when = "lit = 1"; to = "asked_w"; rate = 20; },
@@ -58,6 +61,8 @@ writes: (
   { name = "move"; set = ( "target = $position", "speed = $speed", "go = 1" );
     then = "status.moving = 1, go = 0"; },
   { name = "stop"; edge = "command.stop"; then = "status.moving = 0"; } );
+axis: { status = ( "status", "position" ); position = "position"; moving = "status.moving";
+  in_position = "not status.moving"; move = "move"; stop = "stop"; };
 simulate: {
   start = ( { value = "celsius"; is = "21.5"; }, { value = "position"; is = "-100"; } );
   drift = ( { value = "position"; when = "status.moving"; to = "target"; rate_value = "speed";
