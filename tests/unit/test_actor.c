@@ -449,6 +449,13 @@ static void values_lie_in_registers_as_described(void **state)
     u->profile->registers.byte_order = PROFILE_LOW_FIRST;
     u->profile->registers.base = 1;
     assert_int_equal(get_one(u, 0x101), 0xc801); // 456 at 0x102, as the manual then counts
+    u->profile->registers.base = 40001;          // each table by its own numbers
+    u->profile->values[8].address = 40259;
+    u->profile->values[12].address = 30078;
+    assert_string_equal(u->profile->values[12].name, "serial");
+    assert_int_equal(get_one(u, 0x102), 0xc801);
+    assert_int_equal(u->u.tables->read(u->u.ctx, MODBUS_INPUTS, 77, 1, r, 0), 0);
+    assert_int_equal(r[0], 77 << 8);
     drop(u);
 }
 
