@@ -13,7 +13,9 @@ import pytest
 import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
-from conftest import BUILD, PATIENCE_S, Program, gonio, wait_for
+from conftest import BUILD, PATIENCE_S, ROOT, Program, gonio, wait_for
+
+PROFILES = sorted(p.stem for p in (ROOT / "configs" / "profiles").glob("*.cfg"))
 
 LAMP = r"""
 profile: { name = "lamp"; title = "A lamp"; role = "laser"; protocol = "message"; source = "this test";
@@ -312,6 +314,17 @@ def test_a_profile_is_found_by_its_name(tmp_path):
     with_run.wait_line("ready")
     assert with_run.end() == 0
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_every_profile_is_served(start_sim, name):
+    sim = start_sim("--profile", ROOT / "configs" / "profiles" / f"{name}.cfg")
+    wires = sim.control(do="state")["wires"]
+    assert set(wires) == {name, f"{name}-tcp"} and all(w["plugged"] for w in wires.values())
+    known = {k: v for k, v in values(sim).items() if v is not None}
+    assert known
+    assert sim.control(do="set", values=known)["ok"]
+    assert sim.end() == 0
 
 
 @pytest.mark.parametrize("text, arguments, says", [
