@@ -179,6 +179,18 @@ static void values_go_where_they_should_in_time(void **state)
     }
 }
 
+static void what_follows_an_arrival_begins_at_its_very_time(void **state)
+{
+    (void)state;
+    struct talk *t = talk(laser);
+    t->profile->simulate.drift[0].rate = 7; // warm after 30/7 s
+    hears(t, "l1\r", "OK\r\n");
+    actor_step(&t->actor, MS(5000));
+    double expected = 0.05 * (5 - 30 / 7.0);
+    assert_true(fabs(number(&t->actor, "power_w") - expected) < 1e-9);
+    hush(t);
+}
+
 static void what_is_denied_is_not_done(void **state)
 {
     (void)state;
@@ -437,6 +449,9 @@ static void values_lie_in_registers_as_described(void **state)
     assert_int_equal(put(u, 0x100, 3, (uint16_t[]){0x8000, 0xc2f6, 456}), 0);
     assert_float_equal(number(&u->actor, "temperature"), -123.25, 0);
     assert_float_equal(number(&u->actor, "volts"), 45.6, 1e-12);
+    assert_int_equal(put(u, 0x102, 1, (uint16_t[]){(uint16_t)-7}), 0);
+    assert_float_equal(number(&u->actor, "volts"), -0.7, 1e-12);
+    assert_int_equal(put(u, 0x102, 1, (uint16_t[]){456}), 0);
     assert_int_equal(u->u.tables->read(u->u.ctx, MODBUS_INPUTS, 1, 1, r, 0), 0);
     assert_int_equal(r[0], 77);
     bit = 1;
@@ -560,6 +575,7 @@ int main(void)
         cmocka_unit_test(a_laser_answers_as_its_profile_says),
         cmocka_unit_test(an_answer_takes_its_time_and_early_commands_are_ignored),
         cmocka_unit_test(values_go_where_they_should_in_time),
+        cmocka_unit_test(what_follows_an_arrival_begins_at_its_very_time),
         cmocka_unit_test(what_is_denied_is_not_done),
         cmocka_unit_test(an_ok_line_follows_every_good_answer),
         cmocka_unit_test(a_command_is_repeated_before_its_answer_and_prompt),
