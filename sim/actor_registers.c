@@ -25,7 +25,13 @@ static int words(const struct profile_value *v)
 
 static int first_of(const struct actor *a, const struct profile_value *v)
 {
-    return (int)v->address - the(a)->registers.base;
+    static const int first[] = {[PROFILE_HOLDING] = 40001,
+                                [PROFILE_INPUT] = 30001,
+                                [PROFILE_COIL] = 1,
+                                [PROFILE_DISCRETE] = 10001,
+                                [PROFILE_NO_TABLE] = 0};
+    int base = the(a)->registers.base;
+    return (int)v->address - (base > 10000 ? first[v->table] : base);
 }
 
 // Where two values lie in one register the one counts that can be read, or written.

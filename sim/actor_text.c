@@ -218,12 +218,14 @@ void actor_text_write(const struct actor_values *v, const char *pattern, char *r
                       size_t size)
 {
     struct out o = {.text = ret_text, .size = size};
+    bool optional = false;
     for (const char *p = pattern; *p;) {
         if (begins_field(p)) {
             struct field f = field(v, &p);
-            put_value(&o, v, f);
+            if (f.value >= 0 || !optional)
+                put_value(&o, v, f);
         } else if ((*p == '[' || *p == ']') && !doubled(p)) {
-            p++;
+            optional = *p++ == '[';
         } else {
             p += doubled(p);
             put(&o, *p++);
@@ -237,6 +239,6 @@ void actor_text_unglob(const char *glob, char *ret_text, size_t size)
     struct out o = {.text = ret_text, .size = size};
     for (; *glob; glob++)
         if (*glob != '*')
-            put(&o, *glob == '?' ? '0' : *glob);
+            put(&o, *glob);
     ret_text[o.used] = 0;
 }

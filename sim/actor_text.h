@@ -14,7 +14,8 @@ enum actor_fit {
 // put into v when it fits; otherwise v may be half filled.
 enum actor_fit actor_text_match(struct actor_values *v, const char *pattern, const char *line);
 bool actor_text_has_values(const char *pattern);
-// Cut off when there is no room. Optional parts are written, {} as 0.
+// Cut off when there is no room. Optional parts are written; {} is 0, and nothing where it is
+// optional.
 void actor_text_write(const struct actor_values *v, const char *pattern, char *ret_text,
                       size_t size);
 // A text that a glob is like: without its stars.

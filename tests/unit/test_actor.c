@@ -16,9 +16,10 @@
 #include <string.h>
 
 #define MS(ms) ((int64_t)((ms)*1e6))
-#define HEAD(protocol)                                                                             \
-    "profile: { name = \"p\"; title = \"t\"; role = \"inputs\"; source = \"this test\"; "          \
-    "protocol = \"" protocol "\"; };\n"
+#define HEAD(protocol, role, more)                                                                 \
+    "profile: { name = \"p\"; title = \"t\"; role = \"" role "\"; source = \"this test\"; "        \
+    "protocol = \"" protocol "\"; };\n" role ": { " more " };\n"
+#define ASKED(exchange) HEAD("message", "inputs", "status = ( \"" exchange "\" );")
 
 static void say(void *ctx, const char *line)
 {
@@ -81,38 +82,40 @@ static void hears(struct talk *t, const char *command, const char *expected)
     assert_string_equal(heard, expected);
 }
 
-static const char laser[] = HEAD(
-    "message") "values: ( { name = \"emission\"; type = \"int\"; max = 1; },\n"
-               "  { name = \"setpoint_w\"; max = 0.5; }, { name = \"power_w\"; },\n"
-               "  { name = \"power_mw\"; scale = 1e-3; },\n"
-               "  { name = \"interlock\"; type = \"int\"; max = 1; },\n"
-               "  { name = \"mode\"; type = \"int\"; words = ( \"off\", \"warming\", \"on\" ); },\n"
-               "  { name = \"temperature\"; }, { name = \"model\"; type = \"string\"; } );\n"
-               "framing: { end_out = \"\\r\"; end_in = \"\\r\\n\"; gap_ms = 100; };\n"
-               "exchanges: ( { name = \"emission\"; send = \"l?\"; answer = \"{emission}\"; },\n"
-               "  { name = \"power\"; send = \"pa?\"; answer = \"{power_w:.5f}\"; },\n"
-               "  { name = \"setpoint\"; send = \"p?\"; answer = \"{setpoint_w:.4f}\"; },\n"
-               "  { name = \"set\"; send = \"p {setpoint_w:.4f}\"; answer = \"OK\"; },\n"
-               "  { name = \"mode\"; send = \"gom?\"; answer = \"{mode}\"; },\n"
-               "  { name = \"model\"; send = \"glm?\"; answer = \"{model}[ ]\"; },\n"
-               "  { name = \"on\"; send = \"l1\"; answer = \"OK\"; then = \"emission = 1, mode = "
-               "warming\"; },\n"
-               "  { name = \"off\"; send = \"l0\"; answer = \"OK\"; then = \"emission = 0\"; },\n"
-               "  { name = \"abort\"; send = \"l0\"; then = \"mode = off\"; } );\n"
-               "refusals: ( { like = \"busy*\"; means = \"busy\"; }, { like = \"Syntax error*\"; "
-               "},\n"
-               "  { like = \"error*\"; } );\n"
-               "simulate: { start = ( { value = \"setpoint_w\"; is = \"0.1\"; },\n"
-               "    { value = \"model\"; is = \"1064-05\"; } );\n"
-               "  drift = ( { value = \"temperature\"; when = \"mode = warming\"; to = \"30\"; "
-               "rate = 10;\n"
-               "      then = \"mode = on\"; },\n"
-               "    { value = \"power_w\"; when = \"mode = on\"; to = \"setpoint_w\"; rate = 0.05; "
-               "},\n"
-               "    { value = \"power_w\"; when = \"emission = 0\"; to = \"0\"; } );\n"
-               "  deny = ( { does = \"on\"; when = \"interlock = 1\"; answer = \"Error: "
-               "interlock\"; } );\n"
-               "  reply_ms = 5; };\n";
+static const char laser[] = ASKED(
+    "emission") "values: ( { name = \"emission\"; type = \"int\"; max = 1; },\n"
+                "  { name = \"setpoint_w\"; max = 0.5; }, { name = \"power_w\"; },\n"
+                "  { name = \"power_mw\"; scale = 1e-3; },\n"
+                "  { name = \"interlock\"; type = \"int\"; max = 1; },\n"
+                "  { name = \"mode\"; type = \"int\"; words = ( \"off\", \"warming\", \"on\" ); "
+                "},\n"
+                "  { name = \"temperature\"; }, { name = \"model\"; type = \"string\"; } );\n"
+                "framing: { end_out = \"\\r\"; end_in = \"\\r\\n\"; gap_ms = 100; };\n"
+                "exchanges: ( { name = \"emission\"; send = \"l?\"; answer = \"{emission}\"; },\n"
+                "  { name = \"power\"; send = \"pa?\"; answer = \"{power_w:.5f}\"; },\n"
+                "  { name = \"setpoint\"; send = \"p?\"; answer = \"{setpoint_w:.4f}\"; },\n"
+                "  { name = \"set\"; send = \"p {setpoint_w:.4f}\"; answer = \"OK\"; },\n"
+                "  { name = \"mode\"; send = \"gom?\"; answer = \"{mode}\"; },\n"
+                "  { name = \"model\"; send = \"glm?\"; answer = \"{model}[ ]\"; },\n"
+                "  { name = \"on\"; send = \"l1\"; answer = \"OK\"; then = \"emission = 1, mode = "
+                "warming\"; },\n"
+                "  { name = \"off\"; send = \"l0\"; answer = \"OK\"; then = \"emission = 0\"; },\n"
+                "  { name = \"abort\"; send = \"l0\"; then = \"mode = off\"; } );\n"
+                "refusals: ( { like = \"busy*\"; means = \"busy\"; }, { like = \"Syntax error*\"; "
+                "},\n"
+                "  { like = \"error*\"; } );\n"
+                "simulate: { start = ( { value = \"setpoint_w\"; is = \"0.1\"; },\n"
+                "    { value = \"model\"; is = \"1064-05\"; } );\n"
+                "  drift = ( { value = \"temperature\"; when = \"mode = warming\"; to = \"30\"; "
+                "rate = 10;\n"
+                "      then = \"mode = on\"; },\n"
+                "    { value = \"power_w\"; when = \"mode = on\"; to = \"setpoint_w\"; rate = "
+                "0.05; "
+                "},\n"
+                "    { value = \"power_w\"; when = \"emission = 0\"; to = \"0\"; } );\n"
+                "  deny = ( { does = \"on\"; when = \"interlock = 1\"; answer = \"Error: "
+                "interlock\"; } );\n"
+                "  reply_ms = 5; };\n";
 
 static void a_laser_answers_as_its_profile_says(void **state)
 {
@@ -176,6 +179,18 @@ static void values_go_where_they_should_in_time(void **state)
     }
 }
 
+static void what_follows_an_arrival_begins_at_its_very_time(void **state)
+{
+    (void)state;
+    struct talk *t = talk(laser);
+    t->profile->simulate.drift[0].rate = 7; // warm after 30/7 s
+    hears(t, "l1\r", "OK\r\n");
+    actor_step(&t->actor, MS(5000));
+    double expected = 0.05 * (5 - 30 / 7.0);
+    assert_true(fabs(number(&t->actor, "power_w") - expected) < 1e-9);
+    hush(t);
+}
+
 static void what_is_denied_is_not_done(void **state)
 {
     (void)state;
@@ -194,25 +209,25 @@ static void what_is_denied_is_not_done(void **state)
 static void an_ok_line_follows_every_good_answer(void **state)
 {
     (void)state;
-    struct talk *t = talk(HEAD(
-        "message") "values: ( { name = \"state\"; type = \"word\"; words = ( \"OFF\", \"ON\" ); "
-                   "},\n"
-                   "  { name = \"status\"; type = \"hex\";\n"
-                   "    bits = ( { name = \"emission\"; bit = 1; }, { name = \"fault\"; bit = 0; } "
-                   "); },\n"
-                   "  { name = \"base_c\"; } );\n"
-                   "framing: { end_out = \"\\r\\n\"; end_in = \"\\r\\n\"; ok_line = \"OK\"; };\n"
-                   "exchanges: ( { name = \"set\"; send = \"AM:STAT {state}\"; then = "
-                   "\"status.emission = state\"; },\n"
-                   "  { name = \"get\"; send = \"AM:STAT?\"; answer = \"{state}\"; },\n"
-                   "  { name = \"clear\"; send = \"*CLS\"; answer = \"OK\"; then = \"status = 0\"; "
-                   "},\n"
-                   "  { name = \"status\"; send = \"STAT?\"; answer = \"{status:08X}\";\n"
-                   "    then = \"status.fault = 0\"; },\n"
-                   "  { name = \"base\"; send = \"BAS?\"; answer = \"{base_c:.1f}C\"; } );\n"
-                   "refusals: ( { like = \"ERR-100*\"; } );\n"
-                   "simulate: { start = ( { value = \"base_c\"; is = \"25.3\"; },\n"
-                   "  { value = \"status\"; is = \"0x8001\"; } ); };\n");
+    struct talk *t = talk(ASKED(
+        "status") "values: ( { name = \"state\"; type = \"word\"; words = ( \"OFF\", \"ON\" ); "
+                  "},\n"
+                  "  { name = \"status\"; type = \"hex\";\n"
+                  "    bits = ( { name = \"emission\"; bit = 1; }, { name = \"fault\"; bit = 0; } "
+                  "); },\n"
+                  "  { name = \"base_c\"; } );\n"
+                  "framing: { end_out = \"\\r\\n\"; end_in = \"\\r\\n\"; ok_line = \"OK\"; };\n"
+                  "exchanges: ( { name = \"set\"; send = \"AM:STAT {state}\"; then = "
+                  "\"status.emission = state\"; },\n"
+                  "  { name = \"get\"; send = \"AM:STAT?\"; answer = \"{state}\"; },\n"
+                  "  { name = \"clear\"; send = \"*CLS\"; answer = \"OK\"; then = \"status = 0\"; "
+                  "},\n"
+                  "  { name = \"status\"; send = \"STAT?\"; answer = \"{status:08X}\";\n"
+                  "    then = \"status.fault = 0\"; },\n"
+                  "  { name = \"base\"; send = \"BAS?\"; answer = \"{base_c:.1f}C\"; } );\n"
+                  "refusals: ( { like = \"ERR-100*\"; } );\n"
+                  "simulate: { start = ( { value = \"base_c\"; is = \"25.3\"; },\n"
+                  "  { value = \"status\"; is = \"0x8001\"; } ); };\n");
     hears(t, "AM:STAT?\r\n", "OFF\r\nOK\r\n");
     hears(t, "BAS?\r\n", "25.3C\r\nOK\r\n");
     hears(t, "STAT?\r\n", "00008001\r\nOK\r\n"); // is cleared by reading: after the answer
@@ -228,11 +243,11 @@ static void a_command_is_repeated_before_its_answer_and_prompt(void **state)
 {
     (void)state;
     struct talk *t = talk(
-        HEAD("message") "values: ( { name = \"freq\"; type = \"int\"; min = 20; max = 1000; } );\n"
-                        "framing: { end_out = \"\\r\"; end_in = \"\\r> \"; echo_end = \"\\r\"; };\n"
-                        "exchanges: ( { name = \"get\"; send = \"freq?\"; answer = \"{freq}\"; },\n"
-                        "  { name = \"set\"; send = \"freq={freq}\"; } );\n"
-                        "simulate: { deny = ( { answer = \"CMD_NOT_DEFINED\"; } ); };\n");
+        ASKED("get") "values: ( { name = \"freq\"; type = \"int\"; min = 20; max = 1000; } );\n"
+                     "framing: { end_out = \"\\r\"; end_in = \"\\r> \"; echo_end = \"\\r\"; };\n"
+                     "exchanges: ( { name = \"get\"; send = \"freq?\"; answer = \"{freq}\"; },\n"
+                     "  { name = \"set\"; send = \"freq={freq}\"; } );\n"
+                     "simulate: { deny = ( { answer = \"CMD_NOT_DEFINED\"; } ); };\n");
     hears(t, "freq?\r", "freq?\r20\r> "); // the least it can be
     hears(t, "freq=400\r", "freq=400\r> ");
     hears(t, "freq?\r", "freq?\r400\r> ");
@@ -243,20 +258,20 @@ static void a_command_is_repeated_before_its_answer_and_prompt(void **state)
 static void silence_and_an_error_bit_for_what_is_not_known(void **state)
 {
     (void)state;
-    struct talk *t = talk(HEAD(
-        "message") "values: ( { name = \"esr\"; type = \"int\"; bits = ( { name = \"command\"; bit "
-                   "= 5; } ); },\n"
-                   "  { name = \"x_v\"; }, { name = \"aux_v\"; },\n"
-                   "  { name = \"full_scale_v\"; ladder = ( 2e-9, 5e-9, 1e-8 ); } );\n"
-                   "framing: { end_out = \"\\r\"; end_in = \"\\r\"; };\n"
-                   "exchanges: ( { name = \"esr\"; send = \"*ESR?\"; answer = \"{esr}\"; then = "
-                   "\"esr = 0\"; },\n"
-                   "  { name = \"snap\"; send = \"SNAP? 1,5\"; answer = \"{x_v:.6g},{aux_v:.6g}\"; "
-                   "},\n"
-                   "  { name = \"sens\"; send = \"SENS {full_scale_v}\"; },\n"
-                   "  { name = \"range\"; send = \"SENS?\"; answer = \"{full_scale_v}\"; } );\n"
-                   "simulate: { start = ( { value = \"x_v\"; is = \"0.951359\"; } );\n"
-                   "  deny = ( { then = \"esr.command = 1\"; } ); };\n");
+    struct talk *t = talk(ASKED(
+        "esr") "values: ( { name = \"esr\"; type = \"int\"; bits = ( { name = \"command\"; bit "
+               "= 5; } ); },\n"
+               "  { name = \"x_v\"; }, { name = \"aux_v\"; },\n"
+               "  { name = \"full_scale_v\"; ladder = ( 2e-9, 5e-9, 1e-8 ); } );\n"
+               "framing: { end_out = \"\\r\"; end_in = \"\\r\"; };\n"
+               "exchanges: ( { name = \"esr\"; send = \"*ESR?\"; answer = \"{esr}\"; then = "
+               "\"esr = 0\"; },\n"
+               "  { name = \"snap\"; send = \"SNAP? 1,5\"; answer = \"{x_v:.6g},{aux_v:.6g}\"; "
+               "},\n"
+               "  { name = \"sens\"; send = \"SENS {full_scale_v}\"; },\n"
+               "  { name = \"range\"; send = \"SENS?\"; answer = \"{full_scale_v}\"; } );\n"
+               "simulate: { start = ( { value = \"x_v\"; is = \"0.951359\"; } );\n"
+               "  deny = ( { then = \"esr.command = 1\"; } ); };\n");
     hears(t, "SNAP?1,5\r", "0.951359,0\r");
     hears(t, "SENS 2\r", "");
     hears(t, "SENS?\r", "2\r");
@@ -272,7 +287,7 @@ static void lines_carry_checksums_even_raw_ones(void **state)
 {
     (void)state;
 #define SUMMED(form, more)                                                                         \
-    HEAD("message")                                                                                \
+    ASKED("get")                                                                                   \
     "values: ( { name = \"x\"; type = \"int\"; max = 9; } );\n"                                    \
     "framing: { end_out = \"\\r\"; end_in = \"\\r\"; };\n"                                         \
     "checksum: { kind = \"sum\"; form = \"" form "\"; " more " };\n"                               \
@@ -296,49 +311,76 @@ static void lines_carry_checksums_even_raw_ones(void **state)
 
 // --- registers -----------------------------------------------------------------------------------
 
-static const char axis[] = HEAD(
-    "modbus") "values: ( { name = \"type\"; type = \"int\"; address = 0x5a; format = \"u32\"; min "
-              "= 1; max = 3; },\n"
-              "  { name = \"target\"; type = \"int\"; address = 0x5c; format = \"s32\"; },\n"
-              "  { name = \"speed\"; type = \"int\"; address = 0x5e; format = \"s32\"; min = 0; "
-              "max = 4000000; },\n"
-              "  { name = \"trigger\"; type = \"int\"; address = 0x66; format = \"s32\"; min = -7; "
-              "max = 1; },\n"
-              "  { name = \"input\"; type = \"hex\"; address = 0x7d; bits = ( { name = \"home\"; "
-              "bit = 4; },\n"
-              "    { name = \"stop\"; bit = 5; } ); },\n"
-              "  { name = \"output\"; type = \"hex\"; address = 0x7f; access = \"r\";\n"
-              "    bits = ( { name = \"moving\"; bit = 13; }, { name = \"homed\"; bit = 4; } ); "
-              "},\n"
-              "  { name = \"position\"; type = \"int\"; address = 0xcc; format = \"s32\"; access = "
-              "\"r\"; },\n"
-              "  { name = \"temperature\"; address = 0x100; format = \"f32\"; word_order = "
-              "\"low-first\"; },\n"
-              "  { name = \"volts\"; type = \"int\"; address = 0x102; format = \"s16\"; scale = "
-              "0.1; },\n"
-              "  { name = \"alarm\"; type = \"int\"; address = 0x104; access = \"r\"; },\n"
-              "  { name = \"lamp\"; type = \"int\"; table = \"coil\"; address = 3; max = 1; },\n"
-              "  { name = \"door\"; type = \"int\"; table = \"discrete\"; address = 9; access = "
-              "\"r\"; },\n"
-              "  { name = \"serial\"; type = \"int\"; table = \"input\"; address = 1; access = "
-              "\"r\"; },\n"
-              "  { name = \"homing\"; type = \"int\"; table = \"none\"; } );\n"
-              "registers: { gap_most = 1; };\n"
-              "writes: ( { name = \"move\"; set = ( \"type = 1\", \"target = $position\", \"speed "
-              "= $speed\",\n"
-              "      \"trigger = 1\" ); then = \"output.moving = 1, trigger = 0, homing = 0\"; },\n"
-              "  { name = \"stop\"; edge = \"input.stop\"; then = \"output.moving = 0, homing = "
-              "0\"; },\n"
-              "  { name = \"home\"; edge = \"input.home\";\n"
-              "    then = \"output.moving = 1, output.homed = 0, homing = 1, target = 0, speed = "
-              "100\"; } );\n"
-              "simulate: { start = ( { value = \"position\"; is = \"-50\"; }, { value = "
-              "\"serial\"; is = \"77\"; } );\n"
-              "  drift = ( { value = \"position\"; when = \"output.moving\"; to = \"target\";\n"
-              "      rate_value = \"speed\"; then = \"output.moving = 0, output.homed = homing, "
-              "homing = 0\"; } );\n"
-              "  deny = ( { does = \"move\"; when = \"alarm != 0\"; },\n"
-              "    { does = \"move\"; when = \"homing = 1\"; answer = \"6\"; } ); };\n";
+static const char axis[] = HEAD("modbus", "axis",
+                                "status = ( \"output\", \"position\" ); position = \"position\"; "
+                                "moving = \"output.moving\"; "
+                                "in_position = \"not output.moving\"; move = \"move\"; stop = "
+                                "\"stop\";") "values: ( { name = \"type\"; type = \"int\"; address "
+                                             "= 0x5a; format = \"u32\"; min "
+                                             "= 1; max = 3; },\n"
+                                             "  { name = \"target\"; type = \"int\"; address = "
+                                             "0x5c; format = \"s32\"; },\n"
+                                             "  { name = \"speed\"; type = \"int\"; address = "
+                                             "0x5e; format = \"s32\"; min = 0; "
+                                             "max = 4000000; },\n"
+                                             "  { name = \"trigger\"; type = \"int\"; address = "
+                                             "0x60; format = \"s32\"; min = -7; "
+                                             "max = 1; },\n"
+                                             "  { name = \"input\"; type = \"hex\"; address = "
+                                             "0x7d; bits = ( { name = \"home\"; "
+                                             "bit = 4; },\n"
+                                             "    { name = \"stop\"; bit = 5; } ); },\n"
+                                             "  { name = \"output\"; type = \"hex\"; address = "
+                                             "0x7f; access = \"r\";\n"
+                                             "    bits = ( { name = \"moving\"; bit = 13; }, { "
+                                             "name = \"homed\"; bit = 4; } ); "
+                                             "},\n"
+                                             "  { name = \"position\"; type = \"int\"; address = "
+                                             "0xcc; format = \"s32\"; access = "
+                                             "\"r\"; },\n"
+                                             "  { name = \"temperature\"; address = 0x100; format "
+                                             "= \"f32\"; word_order = "
+                                             "\"low-first\"; },\n"
+                                             "  { name = \"volts\"; type = \"int\"; address = "
+                                             "0x102; format = \"s16\"; scale = "
+                                             "0.1; },\n"
+                                             "  { name = \"alarm\"; type = \"int\"; address = "
+                                             "0x104; access = \"r\"; },\n"
+                                             "  { name = \"lamp\"; type = \"int\"; table = "
+                                             "\"coil\"; address = 3; max = 1; },\n"
+                                             "  { name = \"door\"; type = \"int\"; table = "
+                                             "\"discrete\"; address = 9; access = "
+                                             "\"r\"; },\n"
+                                             "  { name = \"serial\"; type = \"int\"; table = "
+                                             "\"input\"; address = 1; access = "
+                                             "\"r\"; },\n"
+                                             "  { name = \"homing\"; type = \"int\"; table = "
+                                             "\"none\"; } );\n"
+                                             "registers: { gap_most = 1; };\n"
+                                             "writes: ( { name = \"move\"; set = ( \"type = 1\", "
+                                             "\"target = $position\", \"speed "
+                                             "= $speed\",\n"
+                                             "      \"trigger = 1\" ); then = \"output.moving = 1, "
+                                             "trigger = 0, homing = 0\"; },\n"
+                                             "  { name = \"stop\"; edge = \"input.stop\"; then = "
+                                             "\"output.moving = 0, homing = "
+                                             "0\"; },\n"
+                                             "  { name = \"home\"; edge = \"input.home\";\n"
+                                             "    then = \"output.moving = 1, output.homed = 0, "
+                                             "homing = 1, target = 0, speed = "
+                                             "100\"; } );\n"
+                                             "simulate: { start = ( { value = \"position\"; is = "
+                                             "\"-50\"; }, { value = "
+                                             "\"serial\"; is = \"77\"; } );\n"
+                                             "  drift = ( { value = \"position\"; when = "
+                                             "\"output.moving\"; to = \"target\";\n"
+                                             "      rate_value = \"speed\"; then = \"output.moving "
+                                             "= 0, output.homed = homing, "
+                                             "homing = 0\"; } );\n"
+                                             "  deny = ( { does = \"move\"; when = \"alarm != 0\"; "
+                                             "},\n"
+                                             "    { does = \"move\"; when = \"homing = 1\"; answer "
+                                             "= \"6\"; } ); };\n";
 
 struct unit {
     struct profile *profile;
@@ -385,10 +427,10 @@ static uint16_t get_one(struct unit *u, int address)
 
 static int move(struct unit *u, int32_t to, int speed, int trigger)
 {
-    assert_int_equal(put(u, 0x66, 2, (uint16_t[]){0, 0}), 0);
+    assert_int_equal(put(u, 0x60, 2, (uint16_t[]){0, 0}), 0);
     uint16_t r[] = {0, 1, (uint16_t)((uint32_t)to >> 16), (uint16_t)to, 0, (uint16_t)speed};
     int rc = put(u, 0x5a, 6, r);
-    return rc ? rc : put(u, 0x66, 2, (uint16_t[]){0, (uint16_t)trigger});
+    return rc ? rc : put(u, 0x60, 2, (uint16_t[]){0, (uint16_t)trigger});
 }
 
 static void values_lie_in_registers_as_described(void **state)
@@ -407,6 +449,9 @@ static void values_lie_in_registers_as_described(void **state)
     assert_int_equal(put(u, 0x100, 3, (uint16_t[]){0x8000, 0xc2f6, 456}), 0);
     assert_float_equal(number(&u->actor, "temperature"), -123.25, 0);
     assert_float_equal(number(&u->actor, "volts"), 45.6, 1e-12);
+    assert_int_equal(put(u, 0x102, 1, (uint16_t[]){(uint16_t)-7}), 0);
+    assert_float_equal(number(&u->actor, "volts"), -0.7, 1e-12);
+    assert_int_equal(put(u, 0x102, 1, (uint16_t[]){456}), 0);
     assert_int_equal(u->u.tables->read(u->u.ctx, MODBUS_INPUTS, 1, 1, r, 0), 0);
     assert_int_equal(r[0], 77);
     bit = 1;
@@ -419,6 +464,13 @@ static void values_lie_in_registers_as_described(void **state)
     u->profile->registers.byte_order = PROFILE_LOW_FIRST;
     u->profile->registers.base = 1;
     assert_int_equal(get_one(u, 0x101), 0xc801); // 456 at 0x102, as the manual then counts
+    u->profile->registers.base = 40001;          // each table by its own numbers
+    u->profile->values[8].address = 40259;
+    u->profile->values[12].address = 30078;
+    assert_string_equal(u->profile->values[12].name, "serial");
+    assert_int_equal(get_one(u, 0x102), 0xc801);
+    assert_int_equal(u->u.tables->read(u->u.ctx, MODBUS_INPUTS, 77, 1, r, 0), 0);
+    assert_int_equal(r[0], 77 << 8);
     drop(u);
 }
 
@@ -427,8 +479,8 @@ static void exceptions_where_nothing_is_or_may_be(void **state)
     (void)state;
     struct unit *u = unit(axis);
     uint16_t r[8] = {0}, bit = 0;
-    assert_int_equal(u->u.read(u->u.ctx, 0x60, 1, r, 0), MODBUS_BAD_ADDRESS);
-    assert_int_equal(u->u.read(u->u.ctx, 0x5e, 3, r, 0), MODBUS_BAD_ADDRESS);
+    assert_int_equal(u->u.read(u->u.ctx, 0x62, 1, r, 0), MODBUS_BAD_ADDRESS);
+    assert_int_equal(u->u.read(u->u.ctx, 0x60, 3, r, 0), MODBUS_BAD_ADDRESS);
     assert_int_equal(u->u.read(u->u.ctx, 0x102, 3, r, 0), 0);  // a gap of one may be read along
     assert_int_equal(put(u, 0x102, 2, r), MODBUS_BAD_ADDRESS); // but not written
     assert_int_equal(put(u, 0xcc, 2, r), MODBUS_BAD_ADDRESS);  // can only be read
@@ -448,7 +500,6 @@ static void a_move_takes_its_time(void **state)
     struct unit *u = unit(axis);
     assert_int_equal(move(u, 950, 500, 1), 0); // in several requests: nothing of the profile's
     assert_false(get_one(u, 0x7f) & 0x2000);
-    u->profile->values[3].address = 0x60; // now the trigger follows the speed
     uint16_t all[] = {0, 1, 0, 950, 0, 500, 0, 0};
     assert_int_equal(put(u, 0x5a, 8, all), 0); // without the trigger
     assert_false(get_one(u, 0x7f) & 0x2000);
@@ -492,7 +543,6 @@ static void a_denied_write_is_an_exception(void **state)
     (void)state;
     struct unit *u = unit(axis);
     struct gon_error err;
-    u->profile->values[3].address = 0x60;
     const uint16_t all[] = {0, 1, 0, 950, 0, 500, 0, 1}, home = 0x10;
     assert_int_equal(put(u, 0x7d, 1, &home), 0);
     assert_int_equal(put(u, 0x5a, 8, all), 6); // the state that counts is the one with what is sent
@@ -525,6 +575,7 @@ int main(void)
         cmocka_unit_test(a_laser_answers_as_its_profile_says),
         cmocka_unit_test(an_answer_takes_its_time_and_early_commands_are_ignored),
         cmocka_unit_test(values_go_where_they_should_in_time),
+        cmocka_unit_test(what_follows_an_arrival_begins_at_its_very_time),
         cmocka_unit_test(what_is_denied_is_not_done),
         cmocka_unit_test(an_ok_line_follows_every_good_answer),
         cmocka_unit_test(a_command_is_repeated_before_its_answer_and_prompt),

@@ -127,6 +127,7 @@ static void answers_are_written_as_printf_would(void **state)
     writes(&f.v, "{power_w:.3g}|{mode}|{state}|{range}|{status}", "123|2|ON|6|2001");
     writes(&f.v, "{mode:03d},{mode:4d},{status:08x}", "002,   2,00002001");
     writes(&f.v, "[{model} ]{}{{}}", "Rumba 1064 0{}");
+    writes(&f.v, "[{}][ A]", " A"); // what nobody keeps and need not be there
     f.v.number[POWER] = -0.0025;
     writes(&f.v, "{power_w:06.1f}", "-002.5");
     f.v.number[POWER] = (double)INFINITY;
@@ -138,6 +139,9 @@ static void answers_are_written_as_printf_would(void **state)
     assert_string_equal(little, "Rum");
     actor_text_unglob("*syntax error?*", little, sizeof little);
     assert_string_equal(little, "syn");
+    char all[40];
+    actor_text_unglob("*syntax error?*", all, sizeof all);
+    assert_string_equal(all, "syntax error?");
     free(f.p);
 }
 
