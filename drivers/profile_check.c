@@ -6,7 +6,6 @@
 
 #include <ctype.h>
 #include <stdarg.h>
-#include <stdlib.h>
 #include <string.h>
 
 // --- saying --------------------------------------------------------------------------------------
@@ -86,6 +85,8 @@ bool check_asked_name(struct checking *c, struct place at, const char *name)
         return true;
     if (i < 0)
         check_says(c, at, "there is no such %s to ask for", modbus ? "value" : "exchange");
+    else if (modbus && p->values[i].table == PROFILE_NO_TABLE)
+        check_says(c, at, "has no register (table), and cannot be asked for");
     else if (modbus && p->values[i].access == PROFILE_WRITE)
         check_says(c, at, "is only written (access), and cannot be asked for");
     else if (!modbus && !*p->exchanges[i].answer)
@@ -138,17 +139,17 @@ static int see_assignment(void *ctx, int value, double number, const char *text,
 {
     const struct assigning *a = ctx;
     (void)number, (void)text;
-    if (a->may_be && !a->may_be[value])
+    if (!a->may_be[value])
         return gon_fail(err, GON_E_INPUT, "%s %s", a->p->values[value].name, a->not_so);
     return 0;
 }
 
 void check_assignments(struct checking *c, struct place at, const char *text,
-                       const struct profile_param *params, const bool *may_be, const char *not_so)
+                       const bool may_be[PROFILE_VALUES], const char *not_so)
 {
     struct assigning a = {c->p, may_be, not_so};
     struct gon_error err;
-    if (profile_assign(c->p, text, params, see_assignment, &a, &err) < 0)
+    if (profile_assign(c->p, text, NULL, see_assignment, &a, &err) < 0)
         check_says(c, at, "%s", err.text);
 }
 
@@ -185,7 +186,7 @@ void check_codes(struct checking *c, const char *path, const struct profile_code
                            j);
 }
 
-// --- who it is, what is known of it, what is simulated -------------------------------------------
+// --- who it is, and what is known of it ----------------------------------------------------------
 
 static void check_identify(struct checking *c)
 {
@@ -219,10 +220,8 @@ static void check_golden_message(struct checking *c, int i, const struct profile
         profile_text_uses(c->p, c->p->exchanges[exchange].answer, gives);
     }
     check_given(c, check_at("golden[%d].does", i), g->does, "which exchange it shows");
-    check_assignments(c, check_at("golden[%d].with", i), g->with, NULL, sends,
-                      "is not in what is sent");
-    check_assignments(c, check_at("golden[%d].gives", i), g->gives, NULL, gives,
-                      "is not in the answer");
+    check_assignments(c, check_at("golden[%d].with", i), g->with, sends, "is not in what is sent");
+    check_assignments(c, check_at("golden[%d].gives", i), g->gives, gives, "is not in the answer");
 }
 
 static void check_golden_modbus(struct checking *c, int i, const struct profile_golden *g)
@@ -238,8 +237,7 @@ static void check_golden_modbus(struct checking *c, int i, const struct profile_
     if (*g->does && g->asks_count)
         check_says(c, check_at("golden[%d].asks", i),
                    "a write (does), or values asked for; not both");
-    check_assignments(c, check_at("golden[%d].gives", i), g->gives, NULL, gives,
-                      "is not asked for");
+    check_assignments(c, check_at("golden[%d].gives", i), g->gives, gives, "is not asked for");
 }
 
 static void check_golden(struct checking *c)
@@ -252,34 +250,6 @@ static void check_golden(struct checking *c)
             check_golden_message(c, i, g);
         else
             check_golden_modbus(c, i, g);
-    }
-}
-
-static void check_literal(struct checking *c, struct place at, int value, const char *text)
-{
-    struct profile_data *d = calloc(1, sizeof *d);
-    struct gon_error err;
-    if (d && profile_data_set_text(c->p, d, value, text, &err) < 0)
-        check_says(c, at, "%s", err.text);
-    free(d);
-}
-
-static void check_simulate(struct checking *c)
-{
-    const struct profile_simulate *s = &c->p->simulate;
-    for (int i = 0; i < s->start_count; i++)
-        if (check_value_name(c, check_at("simulate.start[%d].value", i), s->start[i].value))
-            check_literal(c, check_at("simulate.start[%d].is", i),
-                          profile_value(c->p, s->start[i].value), s->start[i].is);
-    for (int i = 0; i < s->drift_count; i++) {
-        const struct profile_drift *d = &s->drift[i];
-        const bool known = check_value_name(c, check_at("simulate.drift[%d].value", i), d->value);
-        check_condition(c, check_at("simulate.drift[%d].when", i), d->when);
-        if (known && profile_value(c->p, d->to) < 0)
-            check_literal(c, check_at("simulate.drift[%d].to", i), profile_value(c->p, d->value),
-                          d->to);
-        check_value_name(c, check_at("simulate.drift[%d].rate_value", i), d->rate_value);
-        check_assignments(c, check_at("simulate.drift[%d].then", i), d->then, NULL, NULL, "");
     }
 }
 

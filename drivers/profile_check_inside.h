@@ -24,8 +24,12 @@ bool check_asked_name(struct checking *c, struct place at, const char *name);
 bool check_sent_name(struct checking *c, struct place at, const char *name);
 void check_asks(struct checking *c, const char *path, const struct profile_asks *asks);
 void check_condition(struct checking *c, struct place at, const char *condition);
+// may_be: the values that may stand in it, else not_so is said of them.
 void check_assignments(struct checking *c, struct place at, const char *text,
-                       const struct profile_param *params, const bool *may_be, const char *not_so);
+                       const bool may_be[PROFILE_VALUES], const char *not_so);
+// What the simulated instrument changes: "mode = 4, output.moving = 0, target = position,
+// open = not open".
+void check_then(struct checking *c, struct place at, const char *text);
 void check_pattern(struct checking *c, struct place at, const char *pattern, bool reading);
 // Letters, digits and _; not the same as one of the earlier names.
 void check_new_name(struct checking *c, const char *list, int index, const char *first,
@@ -43,3 +47,4 @@ void check_values(struct checking *c);
 void check_messages(struct checking *c);
 void check_registers(struct checking *c);
 void check_roles(struct checking *c);
+void check_simulate(struct checking *c);

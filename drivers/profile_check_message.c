@@ -82,7 +82,7 @@ static void check_exchange(struct checking *c, int i)
         check_says(c, check_at("exchanges[%d].settle_ms", i), "nothing is asked afterwards");
     if (e->check && !*c->p->errors.ask)
         check_says(c, check_at("exchanges[%d].check", i), "there is no errors.ask to ask by");
-    check_assignments(c, check_at("exchanges[%d].then", i), e->then, NULL, NULL, "");
+    check_then(c, check_at("exchanges[%d].then", i), e->then);
 }
 
 static void check_errors(struct checking *c)

@@ -28,7 +28,7 @@ static bool is_read_only(const struct profile_value *v)
 
 static bool lies(const struct profile *p, const struct profile_value *v, int *ret_address)
 {
-    return registers_address(p, v, ret_address, NULL) == 0;
+    return v->table != PROFILE_NO_TABLE && registers_address(p, v, ret_address, NULL) == 0;
 }
 
 // Read and written apart, in the same registers: a command and its status.
@@ -70,6 +70,8 @@ static void check_register(struct checking *c, int i)
     const struct profile_value *v = &c->p->values[i];
     struct gon_error err;
     int address;
+    if (v->table == PROFILE_NO_TABLE)
+        return;
     if (v->type == PROFILE_STRING)
         check_says(c, check_at("values[%d].type", i), "registers hold no texts");
     if (is_read_only(v) && v->access != PROFILE_READ)
@@ -98,8 +100,8 @@ static int see_set(void *ctx, int value, double number, const char *text, struct
     struct setting *s = ctx;
     const struct profile_value *v = &s->p->values[value];
     (void)number, (void)text;
-    if (v->access == PROFILE_READ)
-        return gon_fail(err, GON_E_INPUT, "%s is only read (access)", v->name);
+    if (v->access == PROFILE_READ || v->table == PROFILE_NO_TABLE)
+        return gon_fail(err, GON_E_INPUT, "%s is only read (access), or has no register", v->name);
     if (s->sets[value])
         return gon_fail(err, GON_E_INPUT, "%s is set twice", v->name);
     s->sets[value] = true;
@@ -186,7 +188,7 @@ static void check_write(struct checking *c, int i)
         check_says(c, check_at("writes[%d].release", i), "only an edge is taken back");
     check_sent_name(c, check_at("writes[%d].release", i), w->release);
     check_condition(c, check_at("writes[%d].verify", i), w->verify);
-    check_assignments(c, check_at("writes[%d].then", i), w->then, move_params, NULL, "");
+    check_then(c, check_at("writes[%d].then", i), w->then);
 }
 
 void check_registers(struct checking *c)

@@ -35,7 +35,8 @@ static const char laser[] =
     "    echoes = true; verify = \"setpoint\"; settle_ms = 10; check = true; },\n"
     "  { name = \"on\"; send = \"l1\"; answer = \"OK\"; then = \"emission = 1\"; },\n"
     "  { name = \"error\"; send = \"e?\"; answer = \"{code}\"; },\n"
-    "  { name = \"live\"; send = \"k\"; }\n"
+    "  { name = \"live\"; send = \"k\";\n"
+    "    then = \"status.fault = 0, code = emission, emission = not code\"; }\n"
     ");\n"
     "refusals: ( { like = \"error*\"; } );\n"
     "errors: { ask = \"error\"; fine = \"code = 0\"; code = \"code\";\n"
@@ -62,7 +63,9 @@ static const char laser[] =
     "simulate: { start = ( { value = \"emission\"; is = \"0\"; }, { value = \"model\"; is = \"L\"; "
     "} );\n"
     "  drift = ( { value = \"setpoint_w\"; when = \"emission = 1\"; to = \"1.5\"; rate = 1;\n"
-    "    then = \"code = 0\"; } ); };\n"
+    "    then = \"code = 0\"; } );\n"
+    "  deny = ( { does = \"on\"; when = \"status.fault\"; answer = \"error {code}\";\n"
+    "    then = \"code = 1\"; } ); };\n"
     "golden: ( { does = \"set_power\"; with = \"setpoint_w = 0.5\"; sent = \"p 0.500\";\n"
     "  received = \"0.5\"; gives = \"setpoint_w = 0.5\"; source = \"manual\"; } );\n";
 
@@ -227,10 +230,12 @@ static void mistakes_in_values_are_named(void **state)
          "t:1: profile.name = \"Lamp 1\": allowed: a..z, 0..9 and -"},
         {"{ name = \"status\"; type", "{ name = \"emission\"; type",
          "t:5: values[1].name = \"emission\": is the name of values[0], too\nt:18: "
-         "exchanges[2].answer = \"{status}\": there is no such value at '{status}'\nt:30: "
-         "identify.restarted = \"status.fault\": there is no value 'status'\nt:36: "
-         "laser.interlock_closed = \"not status.fault\": there is no value 'status'\nt:40: "
-         "laser.may_not[0].when = \"status.fault\": there is no value 'status'"},
+         "exchanges[2].answer = \"{status}\": there is no such value at '{status}'\nt:25: "
+         "exchanges[7].then = \"status.fault = 0, code = emission, emiss...\": there is no value "
+         "'status'\nt:31: identify.restarted = \"status.fault\": there is no value 'status'\nt:37: "
+         "laser.interlock_closed = \"not status.fault\": there is no value 'status'\nt:41: "
+         "laser.may_not[0].when = \"status.fault\": there is no value 'status'\nt:51: "
+         "simulate.deny[0].when = \"status.fault\": there is no value 'status'"},
         {"name = \"tau_s\"", "name = \"tau-s\"",
          "t:9: values[5].name = \"tau-s\": not a name: a letter, then letters, digits and _; no "
          "word of conditions"},
@@ -306,10 +311,10 @@ static void mistakes_in_exchanges_are_named(void **state)
 {
     static const struct mistake mistakes[] = {
         {"{ name = \"status\"; send", "{ name = \"emission\"; send",
-         "t:18: exchanges[2].name = \"emission\": is the name of exchanges[1], too\nt:32: "
-         "laser.status[1] = \"status\": there is no such exchange to ask for\nt:36: "
+         "t:18: exchanges[2].name = \"emission\": is the name of exchanges[1], too\nt:33: "
+         "laser.status[1] = \"status\": there is no such exchange to ask for\nt:37: "
          "laser.interlock_closed = \"not status.fault\": nothing that is asked for it brings "
-         "status\nt:40: laser.may_not[0].when = \"status.fault\": nothing that is asked for it "
+         "status\nt:41: laser.may_not[0].when = \"status.fault\": nothing that is asked for it "
          "brings status"},
         {"name = \"live\"; send = \"k\"", "name = \"live\"; send = \"\"",
          "t:24: exchanges[7].send = \"\": missing; it says the command"},
@@ -317,8 +322,8 @@ static void mistakes_in_exchanges_are_named(void **state)
          "t:20: exchanges[4].send = \"p {setpoint_w:.3f\": '}' is missing at "
          "'{setpoint_w:.3f'\nt:21: exchanges[4].echoes = true: nothing that is sent comes "
          "back\nt:21: exchanges[4].verify = \"setpoint\": reads back nothing that this one "
-         "sends\nt:39: laser.set_power = \"set_power\": does not send the setpoint, "
-         "setpoint_w\nt:50: golden[0].with = \"setpoint_w = 0.5\": setpoint_w is not in what is "
+         "sends\nt:40: laser.set_power = \"set_power\": does not send the setpoint, "
+         "setpoint_w\nt:53: golden[0].with = \"setpoint_w = 0.5\": setpoint_w is not in what is "
          "sent"},
         {"answer = \"{code}\"", "answer = \"{cod}\"",
          "t:23: exchanges[6].answer = \"{cod}\": there is no such value at '{cod}'"},
@@ -331,7 +336,7 @@ static void mistakes_in_exchanges_are_named(void **state)
          "t:17: exchanges[1].believe = \"code < 2\": says nothing about what comes"},
         {"send = \"p {setpoint_w:.3f}\"; answer = \"{setpoint_w}\"",
          "send = \"p {setpoint_w:.3f}\"; answer = \"OK\"",
-         "t:21: exchanges[4].echoes = true: nothing that is sent comes back\nt:51: golden[0].gives "
+         "t:21: exchanges[4].echoes = true: nothing that is sent comes back\nt:54: golden[0].gives "
          "= \"setpoint_w = 0.5\": setpoint_w is not in the answer"},
         {"verify = \"setpoint\"", "verify = \"set_point\"",
          "t:21: exchanges[4].verify = \"set_point\": there is no such exchange to ask for"},
@@ -345,18 +350,28 @@ static void mistakes_in_exchanges_are_named(void **state)
          "t:21: exchanges[4].check = true: there is no errors.ask to ask by"},
         {"then = \"emission = 1\"", "then = \"emission 1\"",
          "t:22: exchanges[5].then = \"emission 1\": '=' is missing behind emission"},
+        {"then = \"emission = 1\"", "then = \"emission = on\"",
+         "t:22: exchanges[5].then = \"emission = on\": 'on' is not a number"},
+        {"then = \"emission = 1\"", "then = \"status.hot = 1\"",
+         "t:22: exchanges[5].then = \"status.hot = 1\": status has no bit 'hot'"},
+        {"then = \"emission = 1\"", "then = \"emission = not lit\"",
+         "t:22: exchanges[5].then = \"emission = not lit\": there is no value 'lit'"},
+        {"then = \"emission = 1\"", "then = \"emission = \"",
+         "t:22: exchanges[5].then = \"emission = \": emission = what?"},
+        {"then = \"emission = 1\"", "then = \"emission = 1 code = 2\"",
+         "t:22: exchanges[5].then = \"emission = 1 code = 2\": a comma is missing before 'code'"},
         {"like = \"error*\"", "like = \"**\"",
-         "t:26: refusals[0].like = \"**\": fits every answer"},
+         "t:27: refusals[0].like = \"**\": fits every answer"},
         {"ask = \"error\"", "ask = \"errors\"",
-         "t:27: errors.ask = \"errors\": there is no such exchange to ask for"},
+         "t:28: errors.ask = \"errors\": there is no such exchange to ask for"},
         {"fine = \"code = 0\"", "fine = \"code == 0\"",
-         "t:27: errors.fine = \"code == 0\": code is compared with nothing"},
+         "t:28: errors.fine = \"code == 0\": code is compared with nothing"},
         {"; code = \"code\"", "; code = \"kode\"",
-         "t:27: errors.code = \"kode\": there is no such value"},
+         "t:28: errors.code = \"kode\": there is no such value"},
         {"code = 2; text", "code = 1; text",
-         "t:28: errors.codes[1].code = 1: is explained by errors.codes[0], too"},
+         "t:29: errors.codes[1].code = 1: is explained by errors.codes[0], too"},
         {"refusals:", "writes: ( { name = \"go\"; set = ( \"code = 1\" ); } );\nrefusals:",
-         "t:26: writes = ( ... ): a message instrument has exchanges instead of writes"},
+         "t:27: writes = ( ... ): a message instrument has exchanges instead of writes"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof mistakes / sizeof *mistakes; i++)
@@ -367,24 +382,24 @@ static void mistakes_in_who_it_is_are_named(void **state)
 {
     static const struct mistake mistakes[] = {
         {"asks = ( \"model\" )", "asks = ( \"modell\" )",
-         "t:29: identify.asks[0] = \"modell\": there is no such exchange to ask for\nt:30: "
+         "t:30: identify.asks[0] = \"modell\": there is no such exchange to ask for\nt:31: "
          "identify.refuse[0].when = \"model ~ 'X*'\": nothing that is asked for it brings "
-         "model\nt:29: identify.title = \"Lamp {model}\": nothing in identify.asks brings "
-         "model\nt:29: identify.serial = \"model\": nothing in identify.asks brings it"},
+         "model\nt:30: identify.title = \"Lamp {model}\": nothing in identify.asks brings "
+         "model\nt:30: identify.serial = \"model\": nothing in identify.asks brings it"},
         {"title = \"Lamp {model}\"", "title = \"Lamp {model} [v]\"",
-         "t:29: identify.title = \"Lamp {model} [v]\": [ ] only stands in an answer"},
+         "t:30: identify.title = \"Lamp {model} [v]\": [ ] only stands in an answer"},
         {"title = \"Lamp {model}\"", "title = \"Lamp {code}\"",
-         "t:29: identify.title = \"Lamp {code}\": nothing in identify.asks brings code"},
+         "t:30: identify.title = \"Lamp {code}\": nothing in identify.asks brings code"},
         {"serial = \"model\"", "serial = \"code\"",
-         "t:29: identify.serial = \"code\": nothing in identify.asks brings it"},
+         "t:30: identify.serial = \"code\": nothing in identify.asks brings it"},
         {"serial = \"model\"", "serial = \"number\"",
-         "t:29: identify.serial = \"number\": there is no such value"},
+         "t:30: identify.serial = \"number\": there is no such value"},
         {"restarted = \"status.fault\"", "restarted = \"status.power\"",
-         "t:30: identify.restarted = \"status.power\": status has no bit 'power'"},
+         "t:31: identify.restarted = \"status.power\": status has no bit 'power'"},
         {"when = \"model ~ 'X*'\"", "when = \"code = 1\"",
-         "t:30: identify.refuse[0].when = \"code = 1\": nothing that is asked for it brings code"},
+         "t:31: identify.refuse[0].when = \"code = 1\": nothing that is asked for it brings code"},
         {"text = \"an X\"", "text = \"\"",
-         "t:30: identify.refuse[0].text = \"\": missing; it says why it is refused"},
+         "t:31: identify.refuse[0].text = \"\": missing; it says why it is refused"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof mistakes / sizeof *mistakes; i++)
@@ -395,68 +410,68 @@ static void mistakes_in_a_laser_are_named(void **state)
 {
     static const struct mistake mistakes[] = {
         {"status = ( \"emission\", \"status\" )", "status = ( \"emission\", \"stat\" ) ",
-         "t:32: laser.status[1] = \"stat\": there is no such exchange to ask for\nt:36: "
+         "t:33: laser.status[1] = \"stat\": there is no such exchange to ask for\nt:37: "
          "laser.interlock_closed = \"not status.fault\": nothing that is asked for it brings "
-         "status\nt:40: laser.may_not[0].when = \"status.fault\": nothing that is asked for it "
+         "status\nt:41: laser.may_not[0].when = \"status.fault\": nothing that is asked for it "
          "brings status"},
         {"once = ( \"setpoint\" )", "once = ( )",
-         "t:39: laser.setpoint = \"setpoint_w\": nothing that is asked for it brings it"},
+         "t:40: laser.setpoint = \"setpoint_w\": nothing that is asked for it brings it"},
         {"light = ( \"emission\" )", "light = ( )",
-         "t:34: laser.light = ( ... ): missing; it says what tells that light comes out\nt:35: "
+         "t:35: laser.light = ( ... ): missing; it says what tells that light comes out\nt:36: "
          "laser.emitting = \"emission = 1\": nothing that is asked for it brings emission"},
         {"light = ( \"emission\" )", "light = ( \"status\" )",
-         "t:35: laser.emitting = \"emission = 1\": nothing that is asked for it brings emission"},
+         "t:36: laser.emitting = \"emission = 1\": nothing that is asked for it brings emission"},
         {"emitting = \"emission = 1\"", "emitting = \"\"",
-         "t:35: laser.emitting = \"\": missing; it says how light is seen"},
+         "t:36: laser.emitting = \"\": missing; it says how light is seen"},
         {"interlock_closed = \"not status.fault\"", "interlock_closed = \"not status.open\"",
-         "t:36: laser.interlock_closed = \"not status.open\": status has no bit 'open'"},
+         "t:37: laser.interlock_closed = \"not status.open\": status has no bit 'open'"},
         {"states = ( { when = \"emission = 1\"; is = \"emitting\"; },\n    { is = \"off\"; } )",
-         "states = ( )", "t:37: laser.states = ( ... ): missing; it says its state"},
+         "states = ( )", "t:38: laser.states = ( ... ): missing; it says its state"},
         {"{ when = \"emission = 1\"; is = \"emitting\"; }", "{ is = \"emitting\"; }",
-         "t:37: laser.states[0].when: always holds, so that those behind it never count"},
+         "t:38: laser.states[0].when: always holds, so that those behind it never count"},
         {"{ is = \"off\"; }", "{ when = \"emission = 0\"; is = \"off\"; }",
-         "t:38: laser.states[1].when = \"emission = 0\": the last one has to hold always"},
+         "t:39: laser.states[1].when = \"emission = 0\": the last one has to hold always"},
         {"is = \"emitting\"", "is = \"warming\"",
-         "t:37: laser.states = ( ... ): none of them is emitting"},
+         "t:38: laser.states = ( ... ): none of them is emitting"},
         {"{ when = \"emission = 1\"; is", "{ when = \"code = 1\"; is",
-         "t:37: laser.states[0].when = \"code = 1\": nothing that is asked for it brings code"},
+         "t:38: laser.states[0].when = \"code = 1\": nothing that is asked for it brings code"},
         {"setpoint = \"setpoint_w\"; set", "set",
-         "t:31: laser.setpoint: missing; it says the value that set_power sends"},
+         "t:32: laser.setpoint: missing; it says the value that set_power sends"},
         {"setpoint = \"setpoint_w\"; set", "setpoint = \"emission\"; set",
-         "t:39: laser.set_power = \"set_power\": does not send the setpoint, emission"},
+         "t:40: laser.set_power = \"set_power\": does not send the setpoint, emission"},
         {"set_power = \"set_power\"", "set_power = \"power\"",
-         "t:39: laser.set_power = \"power\": there is no such exchange to send"},
+         "t:40: laser.set_power = \"power\": there is no such exchange to send"},
         {"; power_most_w = 2", "",
-         "t:31: laser.power_most_w: missing; it says the most it can be set"},
+         "t:32: laser.power_most_w: missing; it says the most it can be set"},
         {"setpoint = \"setpoint_w\"; set", "setpoint = \"setpoint_w\"; power = \"power\"; set",
-         "t:39: laser.power = \"power\": there is no such value"},
+         "t:40: laser.power = \"power\": there is no such value"},
         {"setpoint = \"setpoint_w\"; set", "setpoint = \"setpoint_w\"; fault = \"code\"; set",
-         "t:39: laser.fault = \"code\": nothing that is asked for it brings it"},
+         "t:40: laser.fault = \"code\": nothing that is asked for it brings it"},
         {"may_not = ( { when = \"status.fault\"", "may_not = ( { when = \"code = 1\"",
-         "t:40: laser.may_not[0].when = \"code = 1\": nothing that is asked for it brings code"},
+         "t:41: laser.may_not[0].when = \"code = 1\": nothing that is asked for it brings code"},
         {"on = ( { send = \"on\"; } )", "on = ( )",
-         "t:41: laser.on = ( ... ): missing; it says what switches it on"},
+         "t:42: laser.on = ( ... ): missing; it says what switches it on"},
         {"on = ( { send = \"on\"; } )", "on = ( { send = \"go\"; } )",
-         "t:41: laser.on[0].send = \"go\": there is no such exchange to send"},
+         "t:42: laser.on[0].send = \"go\": there is no such exchange to send"},
         {"off = ( \"\\rl0\" )", "off = ( )",
-         "t:42: laser.off = ( ... ): missing; it says what switches it off"},
+         "t:43: laser.off = ( ... ): missing; it says what switches it off"},
         {"off = ( \"\\rl0\" )", "off = ( \"l0\" )",
-         "t:42: laser.off[0] = \"l0\": begins without the terminator that ends a half-sent "
+         "t:43: laser.off[0] = \"l0\": begins without the terminator that ends a half-sent "
          "command"},
         {"off_asks = ( \"emission\" )", "off_asks = ( )",
-         "t:43: laser.off_asks = ( ... ): missing; it says what tells that it is off\nt:44: "
+         "t:44: laser.off_asks = ( ... ): missing; it says what tells that it is off\nt:45: "
          "laser.is_off = \"emission = 0\": nothing that is asked for it brings emission"},
         {"is_off = \"emission = 0\"", "is_off = \"\"",
-         "t:44: laser.is_off = \"\": missing; it says how it is seen that there is no light"},
+         "t:45: laser.is_off = \"\": missing; it says how it is seen that there is no light"},
         {"is_off = \"emission = 0\"", "is_off = \"code = 0\"",
-         "t:44: laser.is_off = \"code = 0\": nothing that is asked for it brings code"},
+         "t:45: laser.is_off = \"code = 0\": nothing that is asked for it brings code"},
         {"send = \"live\"; period", "send = \"alive\"; period",
-         "t:45: laser.keepalive.send = \"alive\": there is no such exchange to send"},
+         "t:46: laser.keepalive.send = \"alive\": there is no such exchange to send"},
         {"period_ms = 200", "period_ms = 90",
-         "t:45: laser.keepalive.period_ms = 90: below 2 gap_ms: nothing else could be said in "
+         "t:46: laser.keepalive.period_ms = 90: below 2 gap_ms: nothing else could be said in "
          "between"},
         {"laser: {", "inputs: { status = ( \"status\" ); };\nlaser: {",
-         "t:31: inputs = { ... }: but profile.role is laser"},
+         "t:32: inputs = { ... }: but profile.role is laser"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof mistakes / sizeof *mistakes; i++)
@@ -467,34 +482,42 @@ static void mistakes_in_what_is_simulated_and_golden_are_named(void **state)
 {
     static const struct mistake mistakes[] = {
         {"value = \"emission\"; is", "value = \"emision\"; is",
-         "t:47: simulate.start[0].value = \"emision\": there is no such value"},
-        {"is = \"0\"", "is = \"no\"", "t:47: simulate.start[0].is = \"no\": 'no' is not a number"},
+         "t:48: simulate.start[0].value = \"emision\": there is no such value"},
+        {"is = \"0\"", "is = \"no\"", "t:48: simulate.start[0].is = \"no\": 'no' is not a number"},
         {"value = \"setpoint_w\"; when", "value = \"setpoint\"; when",
-         "t:48: simulate.drift[0].value = \"setpoint\": there is no such value"},
+         "t:49: simulate.drift[0].value = \"setpoint\": there is no such value"},
         {"when = \"emission = 1\"; to", "when = \"emission is 1\"; to",
-         "t:48: simulate.drift[0].when = \"emission is 1\": nothing is said about emission"},
+         "t:49: simulate.drift[0].when = \"emission is 1\": nothing is said about emission"},
         {"to = \"1.5\"", "to = \"power\"",
-         "t:48: simulate.drift[0].to = \"power\": 'power' is not a number"},
+         "t:49: simulate.drift[0].to = \"power\": 'power' is not a number"},
         {"rate = 1", "rate_value = \"speed\"",
-         "t:48: simulate.drift[0].rate_value = \"speed\": there is no such value"},
+         "t:49: simulate.drift[0].rate_value = \"speed\": there is no such value"},
         {"then = \"code = 0\"", "then = \"kode = 0\"",
-         "t:49: simulate.drift[0].then = \"kode = 0\": there is no value 'kode'"},
+         "t:50: simulate.drift[0].then = \"kode = 0\": there is no value 'kode'"},
+        {"does = \"on\"; when", "does = \"out\"; when",
+         "t:51: simulate.deny[0].does = \"out\": there is no such exchange to send"},
+        {"when = \"status.fault\"; answer", "when = \"status.faulty\"; answer",
+         "t:51: simulate.deny[0].when = \"status.faulty\": status has no bit 'faulty'"},
+        {"answer = \"error {code}\"", "answer = \"error [{code}]\"",
+         "t:51: simulate.deny[0].answer = \"error [{code}]\": [ ] only stands in an answer"},
+        {"then = \"code = 1\"", "then = \"code = one\"",
+         "t:52: simulate.deny[0].then = \"code = one\": 'one' is not a number"},
         {"does = \"set_power\"; with", "does = \"set_powr\"; with",
-         "t:50: golden[0].does = \"set_powr\": there is no such exchange to send\nt:50: "
-         "golden[0].with = \"setpoint_w = 0.5\": setpoint_w is not in what is sent\nt:51: "
+         "t:53: golden[0].does = \"set_powr\": there is no such exchange to send\nt:53: "
+         "golden[0].with = \"setpoint_w = 0.5\": setpoint_w is not in what is sent\nt:54: "
          "golden[0].gives = \"setpoint_w = 0.5\": setpoint_w is not in the answer"},
         {"does = \"set_power\"; with", "does = \"\"; with",
-         "t:50: golden[0].does = \"\": missing; it says which exchange it shows\nt:50: "
-         "golden[0].with = \"setpoint_w = 0.5\": setpoint_w is not in what is sent\nt:51: "
+         "t:53: golden[0].does = \"\": missing; it says which exchange it shows\nt:53: "
+         "golden[0].with = \"setpoint_w = 0.5\": setpoint_w is not in what is sent\nt:54: "
          "golden[0].gives = \"setpoint_w = 0.5\": setpoint_w is not in the answer"},
         {"with = \"setpoint_w = 0.5\"", "with = \"code = 5\"",
-         "t:50: golden[0].with = \"code = 5\": code is not in what is sent"},
+         "t:53: golden[0].with = \"code = 5\": code is not in what is sent"},
         {"gives = \"setpoint_w = 0.5\"", "gives = \"code = 5\"",
-         "t:51: golden[0].gives = \"code = 5\": code is not in the answer"},
+         "t:54: golden[0].gives = \"code = 5\": code is not in the answer"},
         {"gives = \"setpoint_w = 0.5\"", "gives = \"setpoint_w = half\"",
-         "t:51: golden[0].gives = \"setpoint_w = half\": 'half' is not a number"},
+         "t:54: golden[0].gives = \"setpoint_w = half\": 'half' is not a number"},
         {"source = \"manual\"", "source = \"\"",
-         "t:51: golden[0].source = \"\": missing; it says where these bytes are shown"},
+         "t:54: golden[0].source = \"\": missing; it says where these bytes are shown"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof mistakes / sizeof *mistakes; i++)
@@ -562,6 +585,8 @@ static void mistakes_in_registers_are_named(void **state)
         {"table = \"discrete\"; address = 0x10; access = \"r\"",
          "table = \"discrete\"; address = 0x10",
          "t:11: values[5].access: input registers and discrete inputs are only read: \"r\""},
+        {"address = 0x10; access = \"r\";\n", "table = \"none\"; access = \"r\";\n",
+         "t:20: axis.status[0] = \"status\": has no register (table), and cannot be asked for"},
         {"address = 0x22", "address = 0x22; shares = \"status\"",
          "t:8: values[3].shares = \"status\": does not lie there"},
         {"address = 0x22", "address = 0x22; shares = \"nobody\"",
@@ -598,7 +623,8 @@ static void mistakes_in_writes_are_named(void **state)
         {"\"input = 0\"", "\"input = $position\"",
          "t:17: writes[2].set[0] = \"input = $position\": there is no $position here"},
         {"\"speed = $speed\"", "\"position = 1\"",
-         "t:15: writes[0].set[1] = \"position = 1\": position is only read (access)"},
+         "t:15: writes[0].set[1] = \"position = 1\": position is only read (access), or has no "
+         "register"},
         {"\"speed = $speed\"", "\"goal = 1\"",
          "t:15: writes[0].set[1] = \"goal = 1\": goal is set twice"},
         {"address = 0x22", "address = 0x23",
