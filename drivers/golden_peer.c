@@ -16,7 +16,7 @@
 #include <unistd.h>
 
 #define TURN_MS 5
-#define WAIT_NS CLK_MS(300) // for what was written last
+#define WAIT_NS CLK_MS(100) // for what was written last
 
 struct golden_peer {
     struct golden_script script;
@@ -113,9 +113,9 @@ static void *play(void *arg)
         if (poll(&p, 1, TURN_MS) <= 0)
             continue;
         const ssize_t n = read(g->master, bytes, sizeof bytes);
-        for (ssize_t i = 0; i < n && g->got.size < GOLDEN_BYTES; i++) {
+        for (ssize_t i = 0; i < n && going && g->got.size < GOLDEN_BYTES; i++) {
             g->got.byte[g->got.size++] = bytes[i];
-            going = going && hear(g);
+            going = hear(g);
         }
     }
     return NULL;
