@@ -59,6 +59,13 @@ static void presence(FILE *out, const struct cfg_row *row)
         fprintf(out, ", default %s", row->fallback);
 }
 
+// What scdoc would take for the beginning of bold, or for its own escape.
+static void help(FILE *out, const char *text)
+{
+    for (; *text; text++)
+        fprintf(out, "%s%c", *text == '*' || *text == '\\' ? "\\" : "", *text);
+}
+
 static void describe(FILE *out, const char *path, const struct cfg_row *row)
 {
     for (; row->name; row++) {
@@ -71,7 +78,9 @@ static void describe(FILE *out, const char *path, const struct cfg_row *row)
             fprintf(out, ", %s", row->unit);
         range(out, row);
         presence(out, row);
-        fprintf(out, "\n\t%s\n\n", row->help ? row->help : "");
+        fputs("\n\t", out);
+        help(out, row->help ? row->help : "");
+        fputs("\n\n", out);
         if (row->rows)
             describe(out, strcat(name, row->type == CFG_GROUPS ? "[]" : ""), row->rows);
     }

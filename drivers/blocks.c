@@ -268,35 +268,53 @@ static void print_block(const struct profile *p, const struct block_plan *plan, 
     fputc('\n', out);
 }
 
+static bool answers_fit(const struct block *a, const struct block *b)
+{
+    const struct run first = {a->table, a->address, a->address + a->count, 0, false};
+    const struct run second = {b->table, b->address, b->address + b->count, 0, false};
+    return are_alike(&first, &second) && a->address != b->address;
+}
+
+static int print_alike(const struct block *a, const struct block *b, const char *name, FILE *out)
+{
+    fprintf(out,
+            "%s: the requests for %04Xh and %04Xh have answers of the same length: a late one can "
+            "be taken for the other; declare a readable value beside one of them\n",
+            name, (unsigned)a->address, (unsigned)b->address);
+    return 1;
+}
+
+// before: the last request of the list before this one, of which count is 0 when there is none.
 static int print_plan(const struct profile *p, const struct profile_asks *asks, const char *name,
-                      FILE *out)
+                      struct block *before, FILE *out)
 {
     struct block_plan plan;
     struct gon_error err;
+    int wrong = 0;
     if (blocks_plan(p, asks, &plan, &err) < 0) {
         fprintf(out, "%s: %s\n", name, err.text);
         return 1;
     }
     for (int i = 0; i < plan.count; i++)
         print_block(p, &plan, i, name, out);
-    if (plan.alike < 0)
-        return 0;
-    fprintf(out,
-            "%s: the requests for %04Xh and %04Xh have answers of the same length: a late one can "
-            "be taken for the other; declare a readable value beside one of them\n",
-            name, (unsigned)plan.block[plan.alike].address,
-            (unsigned)plan.block[(plan.alike + 1) % plan.count].address);
-    return 1;
+    if (plan.alike >= 0)
+        wrong += print_alike(&plan.block[plan.alike], &plan.block[(plan.alike + 1) % plan.count],
+                             name, out);
+    if (before->count > 0 && answers_fit(before, &plan.block[0]))
+        wrong += print_alike(before, &plan.block[0], name, out);
+    *before = plan.block[plan.count - 1];
+    return wrong;
 }
 
 int blocks_print(const struct profile *p, FILE *out)
 {
+    struct block before = {.count = 0};
     int wrong = 0;
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++) {
         const struct profile_asks *asks =
             (const struct profile_asks *)((const char *)p + lists[i].offset);
         if (asks->count > 0)
-            wrong += print_plan(p, asks, lists[i].name, out);
+            wrong += print_plan(p, asks, lists[i].name, &before, out);
     }
     return wrong;
 }

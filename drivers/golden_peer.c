@@ -16,14 +16,15 @@
 #include <unistd.h>
 
 #define TURN_MS 5
-#define WAIT_NS CLK_MS(300) // for what was written last
+#define WAIT_NS CLK_MS(100) // for what was written last
 
 struct golden_peer {
     struct golden_script script;
     int master, slave; // slave: so that the master is not hung up while nobody has opened it
     char path[64];
     pthread_t thread;
-    atomic_bool heard, ended; // all of what is shown; no more is wanted
+    // All of what is shown; no more is wanted; the thread has hung up.
+    atomic_bool heard, ended, over;
     struct golden_bytes got;
     int requests;
 };
@@ -103,6 +104,17 @@ static bool hear(struct golden_peer *g)
     return true;
 }
 
+// Another line than the one shown, or nothing to be said to it: waiting on would tell no more.
+static bool is_over(const struct golden_peer *g, bool going)
+{
+    const struct golden_bytes *got = &g->got, *shown = &g->script.sent;
+    const bool differs =
+        g->script.rtu ? !going
+                      : got->size > shown->size || memcmp(got->byte, shown->byte, got->size) != 0;
+    return differs || (g->heard && g->script.received.size == 0);
+}
+
+// Hangs up at its end, so that nobody waits for an answer.
 static void *play(void *arg)
 {
     struct golden_peer *g = arg;
@@ -110,14 +122,17 @@ static void *play(void *arg)
     while (!g->ended) {
         struct pollfd p = {g->master, POLLIN, 0};
         uint8_t bytes[64];
-        if (poll(&p, 1, TURN_MS) <= 0)
-            continue;
-        const ssize_t n = read(g->master, bytes, sizeof bytes);
-        for (ssize_t i = 0; i < n && g->got.size < GOLDEN_BYTES; i++) {
+        const int ready = poll(&p, 1, TURN_MS);
+        if (ready == 0 && is_over(g, going))
+            break;
+        const ssize_t n = ready > 0 ? read(g->master, bytes, sizeof bytes) : 0;
+        for (ssize_t i = 0; i < n && going && g->got.size < GOLDEN_BYTES; i++) {
             g->got.byte[g->got.size++] = bytes[i];
-            going = going && hear(g);
+            going = hear(g);
         }
     }
+    close(g->master);
+    g->over = true;
     return NULL;
 }
 
@@ -139,15 +154,6 @@ static int open_pair(struct golden_peer *g, struct gon_error *err)
     return 0;
 }
 
-static void close_pair(struct golden_peer *g)
-{
-    if (g->slave >= 0)
-        close(g->slave);
-    if (g->master >= 0)
-        close(g->master);
-    free(g);
-}
-
 int golden_peer_start(const struct golden_script *script, struct golden_peer **ret_peer,
                       struct gon_error *err)
 {
@@ -159,7 +165,11 @@ int golden_peer_start(const struct golden_script *script, struct golden_peer **r
     if (rc == 0 && pthread_create(&g->thread, NULL, play, g) != 0)
         rc = gon_fail(err, GON_E_SYSTEM, "no thread to play golden entries in");
     if (rc < 0) {
-        close_pair(g);
+        if (g->slave >= 0)
+            close(g->slave);
+        if (g->master >= 0)
+            close(g->master);
+        free(g);
         return rc;
     }
     *ret_peer = g;
@@ -213,13 +223,14 @@ int golden_peer_finish(struct golden_peer *peer, struct gon_error *err)
 {
     struct clk *clk = clk_system();
     const int64_t end_ns = clk_now_ns(clk) + WAIT_NS;
-    while (!peer->heard && clk_now_ns(clk) < end_ns)
+    while (!peer->heard && !peer->over && clk_now_ns(clk) < end_ns)
         clk_sleep(clk, CLK_MS(1), NULL);
     peer->ended = true;
     pthread_join(peer->thread, NULL);
     // A line that went on behind what is shown is another one.
     const bool same = peer->heard && (peer->script.rtu || is_as_shown(peer));
     int rc = same ? 0 : differs(peer, err);
-    close_pair(peer);
+    close(peer->slave);
+    free(peer);
     return rc;
 }

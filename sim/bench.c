@@ -89,15 +89,15 @@ struct port *bench_port(struct bench *b, enum bench_port which)
 
 // --- an axis' controller -------------------------------------------------------------------------
 
-struct bench_axis bench_axis(const struct bench *b, enum world_axis axis, int64_t t_ns)
+struct bench_motor bench_motor(const struct bench *b, enum world_axis axis, int64_t t_ns)
 {
     const struct sim_az *z = &b->az[axis];
     const struct sim_leadshine *l = &b->leadshine[axis];
     if (b->controller == BENCH_LEADSHINE)
-        return (struct bench_axis){l->homed, l->alarm, sim_leadshine_position_steps(l, t_ns),
-                                   l->moves, l->ignored};
-    return (struct bench_axis){z->homed, z->alarm, sim_az_position_steps(z, t_ns), z->moves,
-                               z->ignored};
+        return (struct bench_motor){l->homed, l->alarm, sim_leadshine_position_steps(l, t_ns),
+                                    l->moves, l->ignored};
+    return (struct bench_motor){z->homed, z->alarm, sim_az_position_steps(z, t_ns), z->moves,
+                                z->ignored};
 }
 
 void bench_raise(struct bench *b, enum world_axis axis, int alarm, int64_t t_ns)

@@ -54,13 +54,13 @@ void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns);
 struct port *bench_port(struct bench *b, enum bench_port which);
 
 // What an axis' controller says of itself, whichever kind it is.
-struct bench_axis {
+struct bench_motor {
     bool homed;
     int alarm; // 0: none
     int32_t steps;
     uint64_t moves, ignored; // commands carried out, and echoed but ignored
 };
 
-struct bench_axis bench_axis(const struct bench *b, enum world_axis axis, int64_t t_ns);
+struct bench_motor bench_motor(const struct bench *b, enum world_axis axis, int64_t t_ns);
 void bench_raise(struct bench *b, enum world_axis axis, int alarm, int64_t t_ns);
 void bench_power_cycle(struct bench *b, enum world_axis axis, int64_t t_ns);

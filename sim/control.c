@@ -18,7 +18,7 @@ static json_t *axes_state(const struct request *r)
 {
     json_t *all = json_object();
     for (int i = 0; i < WORLD_AXES; i++) {
-        const struct bench_axis a = bench_axis(the(r), (enum world_axis)i, r->t_ns);
+        const struct bench_motor a = bench_motor(the(r), (enum world_axis)i, r->t_ns);
         struct motion_state s = motion_at(&the(r)->world.axis[i], r->t_ns);
         json_object_set_new(all, world_axis_names[i],
                             json_pack("{s:f,s:f,s:f,s:b,s:b,s:i,s:i,s:I,s:I}", "motor", s.motor,

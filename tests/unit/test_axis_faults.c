@@ -55,9 +55,9 @@ static void end(struct axis *a)
     bus_close(bus);
 }
 
-static struct bench_axis really(void)
+static struct bench_motor really(void)
 {
-    return bench_axis(&bench, WORLD_THETA_R, vline.clk.t_ns);
+    return bench_motor(&bench, WORLD_THETA_R, vline.clk.t_ns);
 }
 
 static void run_for(double s)

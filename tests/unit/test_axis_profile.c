@@ -47,15 +47,15 @@ static const char text[] =
     "  drift = ( { value = \"at\"; when = \"busy = 1\"; to = \"to\"; rate_value = \"speed\";"
     "    then = \"busy = 0\"; } ); };\n";
 
-static struct profile *profile;
+static const struct profile *profile;
 static struct actor actor;
 static struct sim_modbus slaves;
 static struct bus *bus;
 
-static struct axis *begin(void)
+static struct axis *begin_with(const struct profile *p)
 {
     struct gon_error err;
-    profile = profiles_parse(text);
+    profile = p;
     if (actor_init(&actor, profile, CLK_S(1), &err) < 0)
         fail_msg("%s", err.text);
     sim_modbus_init(&slaves, false, 0, MS(1));
@@ -69,11 +69,21 @@ static struct axis *begin(void)
     return a;
 }
 
-static void end(struct axis *a)
+static struct axis *begin(void)
+{
+    return begin_with(profiles_parse(text));
+}
+
+static void leave(struct axis *a)
 {
     a->ops->free(a);
     bus_close(bus);
-    free(profile);
+}
+
+static void end(struct axis *a)
+{
+    leave(a);
+    free((void *)profile);
 }
 
 static struct axis_status look(struct axis *a)
@@ -166,6 +176,44 @@ static void a_position_that_is_none_is_an_error(void **state)
     end(a);
 }
 
+// --- the profiles that come with gonio, simulated from themselves --------------------------------
+
+static void check_shipped(const char *name)
+{
+    struct axis *a = begin_with(profiles_get(name));
+    struct axis_status s = look(a);
+    assert_true(!s.moving && !s.homed && !s.alarm && s.ready && s.in_position);
+    assert_int_equal(a->ops->home(a, NULL), 0);
+    run_for(1);
+    assert_true(look(a).homed);
+    assert_int_equal(a->ops->move_abs(a, -20000, 10000, 60000, NULL), 0);
+    run_for(1);
+    s = look(a);
+    assert_true(s.moving && !s.in_position && !s.ready);
+    assert_true(s.position_steps < -9900 && s.position_steps > -10200);
+    assert_int_equal(a->ops->stop(a, NULL), 0);
+    s = look(a);
+    assert_true(!s.moving && s.in_position && s.ready);
+    assert_int_equal(s.target_steps, s.position_steps);
+    assert_int_equal(a->ops->move_abs(a, 5000, 10000, 60000, NULL), 0);
+    run_for(5);
+    s = look(a);
+    assert_true(!s.moving && s.ready);
+    assert_int_equal(s.position_steps, 5000);
+    set("alarm_code = 0x30");
+    assert_int_equal(look(a).alarm_code, 0x30);
+    assert_int_equal(a->ops->reset_alarm(a, NULL), 0);
+    assert_false(look(a).alarm);
+    leave(a);
+}
+
+static void shipped_profiles_move_what_they_simulate(void **state)
+{
+    (void)state;
+    check_shipped("oriental-az");
+    check_shipped("leadshine-pr");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -174,6 +222,7 @@ int main(void)
         cmocka_unit_test(what_it_cannot_do_is_said),
         cmocka_unit_test(its_watchdog_is_kept_with_each_status),
         cmocka_unit_test(a_position_that_is_none_is_an_error),
+        cmocka_unit_test(shipped_profiles_move_what_they_simulate),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -247,6 +247,25 @@ static void the_plan_can_be_printed(void **state)
     assert_non_null(strstr(text, "inputs.status: the requests for 01F4h and 0258h"));
 }
 
+static void lists_that_follow_each_other_are_compared(void **state)
+{
+    char text[1000] = "";
+    FILE *out = fmemopen(text, sizeof text, "w");
+    (void)state;
+    add_asked("kind", 0, PROFILE_U16);
+    profile.identify.asks = asks;
+    asks.count = 0;
+    add_asked("status", 100, PROFILE_U16);
+    profile.axis.status = asks;
+    assert_int_equal(blocks_print(&profile, out), 1);
+    fclose(out);
+    assert_non_null(strstr(text, "axis.status: the requests for 0000h and 0064h"));
+    profile.axis.status = profile.identify.asks; // the very same question
+    out = fmemopen(text, sizeof text, "w");
+    assert_int_equal(blocks_print(&profile, out), 0);
+    fclose(out);
+}
+
 // --- any profile ---------------------------------------------------------------------------------
 
 static void invent(void)
@@ -343,6 +362,7 @@ int main(void)
         cmocka_unit_test_setup(what_cannot_be_avoided_is_said, set_up),
         cmocka_unit_test_setup(what_cannot_be_asked_is_an_error, set_up),
         cmocka_unit_test_setup(the_plan_can_be_printed, set_up),
+        cmocka_unit_test_setup(lists_that_follow_each_other_are_compared, set_up),
         cmocka_unit_test_setup(any_profile_has_a_sound_plan, set_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

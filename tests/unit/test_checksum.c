@@ -41,7 +41,8 @@ static const struct known {
     {"CRC-32/MPEG-2",
      {PROFILE_CRC, 32, 0x04c11db7, 0xffffffff, 0, false, false, 0, ""},
      0x0376e6e7},
-    {"sum of 8 bits", {PROFILE_SUM, 8, 0, 0, 0, false, false, 0, ""}, 0xdd}, // 477
+    {"CRC-12/UMTS", {PROFILE_CRC, 12, 0x80f, 0, 0, false, true, 0, ""}, 0xdaf}, // turned at its end
+    {"sum of 8 bits", {PROFILE_SUM, 8, 0, 0, 0, false, false, 0, ""}, 0xdd},    // 477
     {"sum of 16 bits", {PROFILE_SUM, 16, 0, 0, 0, false, false, 0, ""}, 0x01dd},
     {"xor", {PROFILE_XOR, 8, 0, 0, 0, false, false, 0, ""}, 0x31}, // 1^..^8 = 8 in the low bits
     {"LRC", {PROFILE_LRC, 8, 0, 0, 0, false, false, 0, ""}, 0x23},
@@ -122,7 +123,7 @@ static void no_checksum_changes_nothing(void **state)
 
 static void a_wrong_or_missing_checksum_is_told(void **state)
 {
-    struct profile_checksum c = known[14].c;
+    struct profile_checksum c = known[15].c;
     struct gon_error err;
     char text[32] = "123456789*DC", raw[8] = "1\x32";
     size_t size = 99;

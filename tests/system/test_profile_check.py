@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""gonio profile check, doc, list and settings on what is shipped and on a profile with mistakes."""
+import pytest
+
+from conftest import ROOT, gonio
+
+SHIPPED = sorted((ROOT / "configs" / "profiles").glob("*.cfg"))
+
+METER = """\
+profile: { name = "meter"; title = "Meter"; role = "inputs"; protocol = "message"; source = "its manual"; };
+values: ( { name = "x"; unit = "V"; max = 5; help = "the | voltage"; } );
+framing: { end_out = "\\r"; end_in = "\\r\\n"; };
+exchanges: ( { name = "x"; send = "x?"; answer = "{x}"; }, { name = "set"; send = "x {x:.2f}"; answer = "OK"; } );
+inputs: { status = ( "x" ); };
+golden: ( { does = "set"; with = "x = 2"; sent = "x 2.00"; received = "OK"; source = "manual, page 3"; } );
+"""
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
+def test_what_is_shipped_is_right(path):
+    r = gonio("profile", "check", path)
+    assert r.returncode == 0, r.stderr
+    assert r.stdout.startswith(f"{path.stem}: ") and r.stderr == ""
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)
+def test_each_has_a_reference_page(path):
+    r = gonio("profile", "doc", path)
+    assert r.returncode == 0 and r.stderr == ""
+    assert r.stdout.startswith("# ") and "\n## Values\n" in r.stdout and "\nSource: " in r.stdout
+
+
+def test_a_mismatch_says_got_expected_and_where(tmp_path):
+    good = write(tmp_path / "good.cfg", METER)
+    bad = write(tmp_path / "bad.cfg", METER.replace('"x 2.00"', '"x 2.000"'))
+    r = gonio("profile", "check", good, bad)
+    assert r.returncode == 2
+    assert r.stderr == f"{bad}: golden[0] (set): sent: got x 2.00\\r / expected x 2.000\\r / at byte 6\n"
+    assert "golden      1 of 1 entries pass\n" in r.stdout and "golden      0 of 1 entries pass\n" in r.stdout
+
+
+def test_a_mistake_is_told_with_its_line(tmp_path):
+    path = write(tmp_path / "m.cfg", METER.replace('answer = "{x}"', 'answer = "{y}"'))
+    r = gonio("profile", "check", path)
+    assert r.returncode == 2 and r.stdout == ""
+    assert r.stderr == f"{path}:4: exchanges[0].answer = \"{{y}}\": there is no such value at '{{y}}'\n"
+
+
+def test_an_unknown_profile_is_told_where_it_was_looked_for():
+    r = gonio("profile", "check", "nobody")
+    assert r.returncode == 2 and "no profile 'nobody': looked for " in r.stderr
+
+
+def test_a_page_keeps_its_table(tmp_path):
+    r = gonio("profile", "doc", write(tmp_path / "m.cfg", METER))
+    assert "| `x` | real | V | 0 .. 5 | the \\| voltage |\n" in r.stdout
+    assert "- `x 2.00`: manual, page 3\n" in r.stdout
+
+
+def test_list_names_those_of_a_folder_and_those_shipped(tmp_path, monkeypatch):
+    write(tmp_path / "meter.cfg", METER)
+    monkeypatch.setenv("GONIO_PROFILES", str(tmp_path))
+    r = gonio("profile", "list")
+    assert r.returncode == 0, r.stderr
+    names = [line.split("\t")[0] for line in r.stdout.splitlines()]
+    assert names == ["name", "meter"] + [p.stem for p in SHIPPED]
+
+
+def test_settings_are_the_manuals():
+    r = gonio("profile", "settings")  # a star in them is no beginning of bold
+    assert r.returncode == 0 and "*values[].shares*: text" in r.stdout and "like this (\\* and ? as" in r.stdout
