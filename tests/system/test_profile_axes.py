@@ -116,8 +116,8 @@ class Peer:
         self.loop.close()
 
 
-async def tcp_server(context):
-    server = ModbusTcpServer(context, address=("127.0.0.1", 0), allow_reuse_address=True)
+async def tcp_server(context, port=0):
+    server = ModbusTcpServer(context, address=("127.0.0.1", port), allow_reuse_address=True)
     task = asyncio.ensure_future(server.serve_forever())
     await server.serving
     server.task = task
@@ -151,12 +151,18 @@ class Cable:
             os.close(fd)
 
 
+def tcp_peer(port=0):
+    p = Peer(lambda context: tcp_server(context, port))
+    p.port = p.server.server.sockets[0].getsockname()[1]
+    p.link = f"modbus-tcp:127.0.0.1:{p.port}"
+    return p
+
+
 @pytest.fixture(params=["tcp", "rtu"])
 def peer(request):
     """An axis behind pymodbus, and its link."""
     if request.param == "tcp":
-        p = Peer(tcp_server)
-        p.link = f"modbus-tcp:127.0.0.1:{p.server.server.sockets[0].getsockname()[1]}"
+        p = tcp_peer()
         yield p
         p.end()
         return
@@ -179,13 +185,18 @@ def axis_of(daemon, name):
     return next(a for a in daemon.status()["devices"] if a["name"] == name)
 
 
-def test_the_daemon_moves_an_axis_that_pymodbus_serves(start_sim, start_daemon, tmp_path, peer):
+def bench_with(peer, start_sim, folder):
+    """A simulated bench whose sample is moved by the peer's axis."""
     sim = start_sim("--fast", *QUICK_LASER)
     text = (sim.folder / "goniod-tcp.cfg").read_text()
     text = re.sub(r"(buses: \( \{[^}]*\})", rf'\1, {{ name = "peer"; link = "{peer.link}"; timeout_ms = 200; }}', text)
     text = re.sub(r'(name = "sample"; driver = "oriental-az"; bus = )"axes"', r'\1"peer"', text)
-    (tmp_path / "goniod.cfg").write_text(text)
-    d = start_daemon("--config", tmp_path / "goniod.cfg")
+    (folder / "goniod.cfg").write_text(text)
+    return folder / "goniod.cfg"
+
+
+def test_the_daemon_moves_an_axis_that_pymodbus_serves(start_sim, start_daemon, tmp_path, peer):
+    d = start_daemon("--config", bench_with(peer, start_sim, tmp_path))
     d.submit(TINY)
     wait_for(lambda: 30000 in peer.axis.moves)  # out of the beam
     wait_for(lambda: axis_of(d, "sample")["position"] == 30.0)
@@ -193,6 +204,22 @@ def test_the_daemon_moves_an_axis_that_pymodbus_serves(start_sim, start_daemon, 
     assert {(0x7E, 4), (0xC6, 8)} <= set(peer.axis.reads)
     assert peer.axis.moves.count(30000) == 1
     assert d.gonio("stop").returncode == 0
+
+
+def test_an_axis_that_goes_away_is_lost_and_comes_back(start_sim, start_daemon, tmp_path):
+    peer = tcp_peer()
+    try:
+        d = start_daemon("--config", bench_with(peer, start_sim, tmp_path))
+        assert axis_of(d, "sample")["link"] == "ok"
+    finally:
+        peer.end()
+    wait_for(lambda: axis_of(d, "sample")["link"] == "lost")
+    peer = tcp_peer(peer.port)
+    try:
+        wait_for(lambda: axis_of(d, "sample")["link"] == "ok")
+        assert peer.axis.reads[0] == (0x7E, 4)  # who it is, before anything is written
+    finally:
+        peer.end()
 
 
 def test_a_bench_of_leadshine_drives_measures(start_sim, start_daemon):
