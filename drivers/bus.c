@@ -49,9 +49,9 @@ int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
     int rc = link_parse(link, LINK_MODBUS, &l, err);
     if (rc < 0)
         return rc;
-    if (timeout_ms < 10 || timeout_ms > 200 || quiet_ms < 20 || quiet_ms > 1000)
+    if (timeout_ms < 10 || timeout_ms > 200 || quiet_ms < 20 || quiet_ms > 5000)
         return gon_fail(err, GON_E_INPUT,
-                        "%s: timeout %d ms, quiet %d ms; allowed: 10..200 ms and 20..1000 ms", link,
+                        "%s: timeout %d ms, quiet %d ms; allowed: 10..200 ms and 20..5000 ms", link,
                         timeout_ms, quiet_ms);
     struct bus *b = calloc(1, sizeof *b);
     if (!b)

@@ -30,7 +30,7 @@ struct bus_stats {
 };
 
 // timeout_ms: of one answer, 10..200 (the laser's lease allows no longer silence); quiet_ms: the
-// slowest answer a unit was ever seen to give, 20..1000.
+// slowest answer a unit was ever seen to give, 20..5000.
 int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
              const struct cancel *cancel, struct bus **ret_bus, struct gon_error *err);
 void bus_close(struct bus *b);
