@@ -52,7 +52,7 @@ say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
 .DEFAULT_GOAL := all
 .PHONY: all bench check check-slow unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
-all: $(PROGRAMS:%=$(B)/%) $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
+all: $(PROGRAMS:%=$(B)/%) build/share/gonio/profiles $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
 
 # --- objects, one archive a layer, programs -------------------------------------------------------
 objects = $(patsubst %.c,$(B)/obj/%.o,$(filter-out $(1)/main.c,$(wildcard $(1)/*.c)))
@@ -64,6 +64,10 @@ $(B)/lib$(1).a: $(call objects,$(1))
 	$(Q)rm -f $$@ && $(AR) rcs $$@ $$^
 endef
 $(foreach l,$(LAYERS),$(eval $(call layer_rules,$(l))))
+
+# Profiles are found beside a program: ../share/gonio/profiles, as where they are installed.
+build/share/gonio/profiles:
+	$(Q)mkdir -p $(@D) && ln -sfn ../../../configs/profiles $@
 
 libs_of = $(sort $(foreach l,$(1),$(LIBS_$(l)))) -lm
 define program_rules
@@ -203,7 +207,9 @@ install: all doc
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/sbin $(DESTDIR)$(PREFIX)/share/gonio/configs
 	install -m755 $(B)/gonio $(B)/goniosim $(DESTDIR)$(PREFIX)/bin
 	install -m755 $(B)/goniod $(DESTDIR)$(PREFIX)/sbin
+	install -d $(DESTDIR)$(PREFIX)/share/gonio/profiles
 	install -m644 $(wildcard configs/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/configs
+	install -m644 $(wildcard configs/profiles/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/profiles
 	for page in $(notdir $(MAN)); do \
 	    install -D -m644 $(B)/man/$$page $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page || exit 1; done
 uninstall:

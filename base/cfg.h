@@ -16,12 +16,16 @@
 
 enum cfg_type {
     CFG_STRING, // char[size]
+    CFG_BYTES,  // the same, and control characters may be in it ("\r\n", "\x1b")
     CFG_INT,    // int
+    CFG_HEX,    // uint32_t, decimal or hexadecimal (0x007E)
     CFG_REAL,   // double
     CFG_BOOL,   // bool
     CFG_CHOICE, // int: index into choices
     CFG_REALS,  // double[size], count at count_offset; [ ] or ( ) in the file, a single number is a
                 // list of one
+    CFG_STRINGS, // char[size][stride], count at count_offset; control characters may be in them; a
+                 // single text is a list of one
     CFG_GROUP,  // nested struct: { }
     CFG_GROUPS  // array of structs: ( { }, { } )
 };
@@ -30,15 +34,15 @@ struct cfg_row {
     const char *name;
     enum cfg_type type;
     size_t offset;        // of the member in its struct
-    size_t size;          // CFG_STRING bytes, CFG_REALS and CFG_GROUPS the most elements
+    size_t size;          // CFG_STRING, CFG_BYTES bytes; lists: the most elements
     const char *unit;     // "deg", "s", ... NULL: none
-    double min, max;      // inclusive; CFG_INT, CFG_REAL, CFG_REALS; equal: any
+    double min, max;      // inclusive; numbers and lists of them; equal: any
     const char *fallback; // default, as written in a file; NULL: must be given; groups: "" or NULL
     const char *help;     // one sentence
     const char *const *choices; // CFG_CHOICE, NULL at its end
     const struct cfg_row *rows; // CFG_GROUP, CFG_GROUPS; a row without name ends a table
-    size_t stride;              // CFG_GROUPS: sizeof one element
-    size_t count_offset;        // CFG_REALS, CFG_GROUPS: of the int that gets the count
+    size_t stride;              // CFG_GROUPS, CFG_STRINGS: sizeof one element
+    size_t count_offset;        // lists: of the int that gets the count
 };
 
 // Who hears of mistakes: one call a line, without newline. NULL say: nobody.

@@ -9,9 +9,14 @@ static const char *kind(const struct cfg_row *row)
 {
     switch (row->type) {
     case CFG_STRING:
+    case CFG_BYTES:
         return "text";
+    case CFG_STRINGS:
+        return "list of texts";
     case CFG_INT:
         return "whole number";
+    case CFG_HEX:
+        return "whole number, also hexadecimal";
     case CFG_REAL:
         return "number";
     case CFG_BOOL:
@@ -30,8 +35,9 @@ static const char *kind(const struct cfg_row *row)
 
 static void range(FILE *out, const struct cfg_row *row)
 {
-    bool number = row->type == CFG_INT || row->type == CFG_REAL || row->type == CFG_REALS;
-    int digits = row->type == CFG_INT ? 17 : 9; // whole numbers to the last digit
+    bool whole = row->type == CFG_INT || row->type == CFG_HEX;
+    bool number = whole || row->type == CFG_REAL || row->type == CFG_REALS;
+    int digits = whole ? 17 : 9; // whole numbers to the last digit
     if (!number || row->min == row->max)
         return;
     if (isinf(row->max))

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,16 +60,29 @@ static bool limited(const struct cfg_row *row)
     return row->min != row->max;
 }
 
+static bool whole(const struct cfg_row *row)
+{
+    return row->type == CFG_INT || row->type == CFG_HEX;
+}
+
 static void allowed(const struct cfg_row *row, char *text, size_t size)
 {
     const char *unit = row->unit ? row->unit : "", *space = row->unit ? " " : "";
-    int digits = row->type == CFG_INT ? 17 : 9; // whole numbers to the last digit
+    int digits = whole(row) ? 17 : 9; // whole numbers to the last digit
     if (isinf(row->max))
         snprintf(text, size, "at least %.*g%s%s", digits, row->min, space, unit);
     else if (isinf(row->min))
         snprintf(text, size, "at most %.*g%s%s", digits, row->max, space, unit);
     else
         snprintf(text, size, "%.*g..%.*g%s%s", digits, row->min, digits, row->max, space, unit);
+}
+
+// What libconfig kept of a hexadecimal number is its low half: the number is that of the text.
+static double hexadecimal(const struct place *at, const config_setting_t *s)
+{
+    char text[CFG_VALUE];
+    cfg_show(at->file, s, text, sizeof text);
+    return (double)strtoull(text, NULL, 16);
 }
 
 static int take_number(const struct place *at, const config_setting_t *s, const struct cfg_row *row,
@@ -89,14 +103,18 @@ static int take_number(const struct place *at, const config_setting_t *s, const 
     }
     char range[80];
     allowed(row, range, sizeof range);
-    if (config_setting_get_format(s) == CONFIG_FORMAT_HEX) // cut to 32 bits without a word
-        return wrong(at, s, "hexadecimal; write a decimal number");
-    if (row->type == CFG_INT && value != floor(value))
+    if (config_setting_get_format(s) == CONFIG_FORMAT_HEX) { // cut to 32 bits without a word
+        if (row->type != CFG_HEX)
+            return wrong(at, s, "hexadecimal; write a decimal number");
+        value = hexadecimal(at, s);
+    }
+    if (whole(row) && value != floor(value))
         return wrong(at, s, "not a whole number");
     if (!isfinite(value) || (limited(row) && !(value >= row->min && value <= row->max)))
         return wrong(at, s, "out of range%s%s", limited(row) ? "; allowed " : "",
                      limited(row) ? range : "");
-    if (row->type == CFG_INT && !(value >= INT_MIN && value <= INT_MAX))
+    if ((row->type == CFG_INT && !(value >= INT_MIN && value <= INT_MAX)) ||
+        (row->type == CFG_HEX && !(value >= 0 && value <= UINT32_MAX)))
         return wrong(at, s, "out of range");
     *ret_value = value;
     return 0;
@@ -106,6 +124,8 @@ static void put_number(const struct place *at, const struct cfg_row *row, double
 {
     if (at->target && row->type == CFG_INT)
         *(int *)member(at, row->offset) = (int)value;
+    else if (at->target && row->type == CFG_HEX)
+        *(uint32_t *)member(at, row->offset) = (uint32_t)value;
     else if (at->target)
         *(double *)member(at, row->offset) = value;
 }
@@ -151,30 +171,53 @@ static int utf8_length(const unsigned char *p)
     return bad ? 0 : n;
 }
 
-static bool printable_utf8(const char *text)
+static bool is_utf8(const char *text, bool control)
 {
     for (const unsigned char *p = (const unsigned char *)text; *p;) {
         int n = utf8_length(p);
-        if (n == 0 || (*p < 0x20 && *p != '\n' && *p != '\t') || *p == 0x7f)
+        if (n == 0 || (!control && ((*p < 0x20 && *p != '\n' && *p != '\t') || *p == 0x7f)))
             return false;
         p += n;
     }
     return true;
 }
 
-static int take_string(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+// Into to, which holds size bytes; NULL: only check.
+static int take_text(const struct place *at, const config_setting_t *s, bool control, char *to,
+                     size_t size)
 {
     if (config_setting_type(s) != CONFIG_TYPE_STRING)
         return wrong(at, s, "not a text; write it in double quotes");
     const char *text = config_setting_get_string(s);
-    if (strlen(text) >= row->size)
-        return wrong(at, s, "%zu bytes long; at most %zu are allowed", strlen(text), row->size - 1);
-    if (!printable_utf8(text))
-        return cfg_say(at->file, cfg_line(s),
-                       "%s: not UTF-8 text, or with control characters in it", at->path);
-    if (at->target)
-        strncpy(member(at, row->offset), text, row->size); // fills the rest with zeros
+    if (strlen(text) >= size)
+        return wrong(at, s, "%zu bytes long; at most %zu are allowed", strlen(text), size - 1);
+    if (!is_utf8(text, control))
+        return cfg_say(at->file, cfg_line(s), "%s: not UTF-8 text%s", at->path,
+                       control ? "" : ", or with control characters in it");
+    if (to)
+        strncpy(to, text, size); // fills the rest with zeros
     return 0;
+}
+
+static int take_strings(const struct place *at, const config_setting_t *s,
+                        const struct cfg_row *row)
+{
+    bool list = config_setting_is_array(s) || config_setting_is_list(s);
+    int count = list ? config_setting_length(s) : 1, mistakes = 0;
+    char *texts = member(at, row->offset);
+    if ((size_t)count > row->size)
+        return wrong(at, s, "%d texts; at most %zu are allowed", count, row->size);
+    if (count == 0 && !row->fallback)
+        return wrong(at, s, "an empty list; give at least one text");
+    for (int i = 0; i < count; i++) {
+        const struct place element = inner(at, NULL, i, NULL);
+        mistakes += take_text(list ? &element : at,
+                              list ? config_setting_get_elem(s, (unsigned)i) : s, true,
+                              texts ? texts + (size_t)i * row->stride : NULL, row->stride);
+    }
+    if (at->target)
+        *(int *)member(at, row->count_offset) = count;
+    return mistakes;
 }
 
 static int take_choice(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
@@ -228,7 +271,10 @@ static int take_row(const struct place *at, const config_setting_t *s, const str
     int mistakes;
     switch (row->type) {
     case CFG_STRING:
-        return take_string(at, s, row);
+    case CFG_BYTES:
+        return take_text(at, s, row->type == CFG_BYTES, member(at, row->offset), row->size);
+    case CFG_STRINGS:
+        return take_strings(at, s, row);
     case CFG_CHOICE:
         return take_choice(at, s, row);
     case CFG_REALS:
@@ -236,6 +282,7 @@ static int take_row(const struct place *at, const config_setting_t *s, const str
     case CFG_GROUPS:
         return take_groups(at, s, row);
     case CFG_INT:
+    case CFG_HEX:
     case CFG_REAL:
         mistakes = take_number(at, s, row, &value);
         put_number(at, row, value);
@@ -267,7 +314,7 @@ static void fall_back_word(const struct place *at, const struct cfg_row *row, co
     bool quoted = length >= 2 && text[0] == '"' && text[length - 1] == '"';
     snprintf(word, sizeof word, "%.*s", (int)(quoted ? length - 2 : length),
              quoted ? text + 1 : text);
-    if (row->type == CFG_STRING) {
+    if (row->type != CFG_CHOICE) {
         strncpy(member(at, row->offset), word, row->size);
         return;
     }
@@ -310,12 +357,14 @@ static void fall_back(const struct place *at, const struct cfg_row *row)
     struct place in = *at;
     switch (row->type) {
     case CFG_STRING:
+    case CFG_BYTES:
         fall_back_word(at, row, text);
         break;
     case CFG_CHOICE:
         fall_back_word(at, row, *text ? text : row->choices[0]);
         break;
     case CFG_INT:
+    case CFG_HEX:
     case CFG_REAL:
         put_number(at, row, number(text, strlen(text)));
         break;
@@ -326,6 +375,7 @@ static void fall_back(const struct place *at, const struct cfg_row *row)
         fall_back_reals(at, row, text);
         break;
     case CFG_GROUPS:
+    case CFG_STRINGS:
         *(int *)member(at, row->count_offset) = 0;
         break;
     case CFG_GROUP:

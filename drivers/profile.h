@@ -78,15 +78,15 @@ struct profile_bit {
 // carries the word, the number is its index.
 struct profile_value {
     char name[PROFILE_NAME];
-    int type;                 // enum profile_type
+    int type; // enum profile_type
     char unit[12];
     double scale, offset;
     bool inverse;
-    double min, max;          // of the number; equal: any. Beyond: the answer is not believed
-    double resolution;        // of the wire, in the unit; 0: not known. Read-backs may differ by it
-    double over[4];           // wire values that mean "beyond the range": the number is INFINITY
+    double min, max;   // of the number; equal: any. Beyond: the answer is not believed
+    double resolution; // of the wire, in the unit; 0: not known. Read-backs may differ by it
+    double over[4];    // wire values that mean "beyond the range": the number is INFINITY
     int over_count;
-    double invalid[4];        // wire values that are no measurement: the value stays unknown
+    double invalid[4]; // wire values that are no measurement: the value stays unknown
     int invalid_count;
     double ladder[PROFILE_LADDER];
     int ladder_count, ladder_first;
@@ -97,20 +97,20 @@ struct profile_value {
     char valid[PROFILE_TEXT]; // condition: where it does not hold the value is unknown
     char help[PROFILE_TEXT];
     // Modbus
-    int table;    // enum profile_table
+    int table;        // enum profile_table
     uint32_t address; // as the manual counts it; registers.base is subtracted
-    int format;   // enum profile_format
-    int word_order; // 0: as registers.word_order; else 1 + enum profile_order
-    int access;   // enum profile_access
-    bool alone;   // never read in a block with its neighbours
+    int format;       // enum profile_format
+    int word_order;   // 0: as registers.word_order; else 1 + enum profile_order
+    int access;       // enum profile_access
+    bool alone;       // never read in a block with its neighbours
 };
 
 // --- message instruments -------------------------------------------------------------------------
 
 struct profile_framing {
     char end_out[8], end_in[8];
-    char echo_end[8];     // the device repeats the command, then this; "": no echo
-    char ok_line[16];     // a line that follows each good answer; "": none
+    char echo_end[8]; // the device repeats the command, then this; "": no echo
+    char ok_line[16]; // a line that follows each good answer; "": none
     double gap_ms, timeout_ms, quiet_ms;
     char sync[PROFILE_NAME]; // exchange whose answer is known: gets into step again
 };
@@ -119,33 +119,35 @@ enum profile_sum { PROFILE_NO_SUM, PROFILE_CRC, PROFILE_SUM, PROFILE_XOR, PROFIL
 enum profile_sum_form { PROFILE_HEX_UPPER, PROFILE_HEX_LOWER, PROFILE_RAW_HIGH, PROFILE_RAW_LOW };
 
 // Of each command and answer: over the text without terminators, written behind it. RAW_HIGH puts
-// the high byte first. LRC: two's complement of the sum of bytes (Modbus over Serial Line, 2.5.2.2).
+// the high byte first. LRC: two's complement of the sum of bytes (Modbus over Serial
+// Line, 2.5.2.2).
 struct profile_checksum {
-    int kind; // enum profile_sum
+    int kind;  // enum profile_sum
     int width; // bits: 8, 16, 32
     uint32_t polynomial, initial, xor_out;
     bool reflect_in, reflect_out;
-    int form; // enum profile_sum_form
+    int form;       // enum profile_sum_form
     char before[8]; // between text and checksum ("*")
 };
 
 struct profile_exchange {
     char name[PROFILE_NAME];
-    char send[PROFILE_TEXT];   // pattern; what is sent without its terminator
-    char answer[PROFILE_TEXT]; // pattern; "": no answer comes
+    char send[PROFILE_TEXT];    // pattern; what is sent without its terminator
+    char answer[PROFILE_TEXT];  // pattern; "": no answer comes
     char believe[PROFILE_TEXT]; // condition over the new values; otherwise it is asked again
-    bool echoes;     // values that were sent and come back must be the same, else it was refused
+    bool echoes; // values that were sent and come back must be the same, else it was refused
     char verify[PROFILE_NAME]; // after a setting: this exchange reads back what was set
     double settle_ms;          // after a setting, before it is verified
     double timeout_ms;         // 0: as framing
-    bool check;      // ask for errors afterwards
-    char then[PROFILE_TEXT]; // what it changes in the simulated instrument: "emission = 1, mode = 4"
+    bool check;                // ask for errors afterwards
+    char
+        then[PROFILE_TEXT]; // what it changes in the simulated instrument: "emission = 1, mode = 4"
     char help[PROFILE_TEXT];
 };
 
 enum profile_meaning { // of a refusal
     PROFILE_REFUSED,
-    PROFILE_BUSY,      // again, later
+    PROFILE_BUSY, // again, later
     PROFILE_OPEN_INTERLOCK,
     PROFILE_KEY,
     PROFILE_FAULTY,
@@ -165,7 +167,7 @@ struct profile_code {
 
 // An error queue or register that is asked after exchanges with check.
 struct profile_errors {
-    char ask[PROFILE_NAME]; // exchange; "": there is none
+    char ask[PROFILE_NAME];  // exchange; "": there is none
     char fine[PROFILE_TEXT]; // condition: nothing is wrong
     char code[PROFILE_NAME]; // value with the code
     struct profile_code codes[PROFILE_CODES];
@@ -175,10 +177,10 @@ struct profile_errors {
 // --- Modbus instruments --------------------------------------------------------------------------
 
 struct profile_registers {
-    int base;       // what the manual calls the first register: 0, 1 or 40001
+    int base;                   // what the manual calls the first register: 0, 1 or 40001
     int word_order, byte_order; // enum profile_order
-    int block_most; // registers in one read, 1..125
-    int gap_most;   // unwanted registers that may be read along
+    int block_most;             // registers in one read, 1..125
+    int gap_most;               // unwanted registers that may be read along
     double timeout_ms, quiet_ms;
 };
 
@@ -186,10 +188,10 @@ struct profile_write {
     char name[PROFILE_NAME];
     char set[PROFILE_ITEMS][PROFILE_TEXT]; // "speed = $speed", "type = 1"; one transaction
     int set_count;
-    char edge[PROFILE_TEXT]; // "input.stop": set and taken back; instead of set
+    char edge[PROFILE_TEXT];   // "input.stop": set and taken back; instead of set
     char verify[PROFILE_TEXT]; // condition that must hold afterwards
-    bool repeat;     // may be sent again when its answer was lost
-    char then[PROFILE_TEXT]; // as in exchanges
+    bool repeat;               // may be sent again when its answer was lost
+    char then[PROFILE_TEXT];   // as in exchanges
     char help[PROFILE_TEXT];
 };
 
@@ -201,10 +203,10 @@ struct profile_golden {
     char does[PROFILE_NAME]; // exchange or write; Modbus reads: "" and asks
     char asks[PROFILE_ASKS][PROFILE_NAME];
     int asks_count;
-    int unit; // Modbus address
+    int unit;                // Modbus address
     char with[PROFILE_LONG]; // what is set: "setpoint_w = 0.1, ..."
     char sent[PROFILE_LONG], received[PROFILE_LONG];
-    char gives[PROFILE_LONG]; // values read from it, in the same form
+    char gives[PROFILE_LONG];  // values read from it, in the same form
     char source[PROFILE_TEXT]; // manual and page, or public repository and path
 };
 
@@ -229,9 +231,9 @@ struct profile_rules {
 
 struct profile_identify {
     struct profile_asks asks;
-    struct profile_rules refuse; // when: not the device, or not usable; text says why
-    char title[PROFILE_TEXT];    // pattern: what it is called
-    char serial[PROFILE_NAME];   // value: identifies one unit after replugging; "": none
+    struct profile_rules refuse;  // when: not the device, or not usable; text says why
+    char title[PROFILE_TEXT];     // pattern: what it is called
+    char serial[PROFILE_NAME];    // value: identifies one unit after replugging; "": none
     char restarted[PROFILE_TEXT]; // condition that tells of a power cycle when seen in any answer
 };
 
@@ -246,14 +248,14 @@ struct profile_laser {
     struct profile_asks once;   // asked once and after a setting (set-point)
     struct profile_asks light;  // what emitting needs, and nothing more
     char emitting[PROFILE_TEXT], interlock_closed[PROFILE_TEXT]; // conditions
-    struct profile_rules states; // is: enum laser_state's names
+    struct profile_rules states;                                 // is: enum laser_state's names
     char power[PROFILE_NAME], setpoint[PROFILE_NAME], fault[PROFILE_NAME]; // values; "": none
     char set_power[PROFILE_NAME]; // exchange or write; sends the value setpoint
     double power_most_w;
     struct profile_asks before_on; // asked before ON, besides status
-    struct profile_rules may_not; // conditions against ON: is a meaning, text
-    struct profile_rules prepare; // sent before ON, all whose condition holds
-    struct profile_rules on;      // the one that is sent
+    struct profile_rules may_not;  // conditions against ON: is a meaning, text
+    struct profile_rules prepare;  // sent before ON, all whose condition holds
+    struct profile_rules on;       // the one that is sent
     struct profile_asks after_refusal;
     struct profile_rules refusals; // why: is a meaning
     char off[4][PROFILE_TEXT]; // what goes out blind, in turn, with what ends a half-sent command
@@ -268,7 +270,7 @@ struct profile_laser {
 struct profile_detector {
     // From the bench: values time_constant_s, slope_db, monitor_aux, wavelength_nm are set (as far
     // as the profile has them) before setup is sent.
-    struct profile_rules setup; // sent in this order, all whose condition holds
+    struct profile_rules setup;    // sent in this order, all whose condition holds
     char full_scale[PROFILE_NAME]; // value with a ladder: the ranges
     struct profile_asks read_range;
     char set_range[PROFILE_NAME];
@@ -290,8 +292,8 @@ struct profile_axis {
     // move is given $position, $speed, $acceleration (steps, steps/s, steps/s2); sent once
     char move[PROFILE_NAME], stop[PROFILE_NAME], home[PROFILE_NAME], reset[PROFILE_NAME],
         enable[PROFILE_NAME], clear[PROFILE_NAME]; // clear: takes back command bits left set
-    double speed_most, acceleration_most; // steps/s, steps/s2
-    char following[PROFILE_TEXT]; // condition: a following error
+    double speed_most, acceleration_most;          // steps/s, steps/s2
+    char following[PROFILE_TEXT];                  // condition: a following error
     struct profile_code alarms[PROFILE_CODES];
     int alarms_count;
     char watchdog[PROFILE_NAME]; // write; "": none
@@ -299,10 +301,10 @@ struct profile_axis {
 };
 
 struct profile_position {
-    char name[PROFILE_NAME];  // "open", "closed", "1"
-    char when[PROFILE_TEXT];  // condition: it is there
-    char send[PROFILE_NAME];  // what takes it there, sent only while it is not
-    bool toggles;             // what is sent only changes over: never sent before the state is known
+    char name[PROFILE_NAME]; // "open", "closed", "1"
+    char when[PROFILE_TEXT]; // condition: it is there
+    char send[PROFILE_NAME]; // what takes it there, sent only while it is not
+    bool toggles;            // what is sent only changes over: never sent before the state is known
 };
 
 struct profile_selector {
@@ -331,7 +333,7 @@ struct profile_drift {
     char value[PROFILE_NAME], when[PROFILE_TEXT], to[PROFILE_NAME];
     double rate;
     char rate_value[PROFILE_NAME]; // or: as fast as this value says
-    char then[PROFILE_TEXT]; // once it is there
+    char then[PROFILE_TEXT];       // once it is there
 };
 
 struct profile_simulate {
@@ -374,8 +376,8 @@ struct profile {
 extern const struct cfg_row profile_schema[];
 
 // The lists that "is" and the like choose from, NULL at their end.
-extern const char *const profile_roles[], *const profile_laser_states[], *const profile_flags[],
-    *const profile_meanings[];
+extern const char *const profile_roles[], *const profile_laser_states[],
+                                              *const profile_flags[], *const profile_meanings[];
 
 // Reads and checks a file, every name, pattern and condition in it too; every mistake goes to the
 // sink as "file:line: ...". ret_text (may be NULL) gets the file as it was read; free it.

@@ -27,5 +27,4 @@ int profile_text_read(const struct profile *p, const char *pattern, const char *
 int profile_text_check(const struct profile *p, const char *pattern, bool reading,
                        struct gon_error *err);
 // ret_uses[value] is set to true for each value in it.
-void profile_text_uses(const struct profile *p, const char *pattern,
-                       bool ret_uses[PROFILE_VALUES]);
+void profile_text_uses(const struct profile *p, const char *pattern, bool ret_uses[PROFILE_VALUES]);

@@ -26,12 +26,13 @@ int session_open(const struct profile *p, const char *link, struct clk *clk,
 // Over a bus, which is borrowed. NULL without memory.
 struct session *session_on_bus(const struct profile *p, struct bus *bus, int unit);
 void session_free(struct session *s);
-int session_reopen(struct session *s, struct gon_error *err); // of a bus: nothing, its owner does it
+int session_reopen(struct session *s,
+                   struct gon_error *err); // of a bus: nothing, its owner does it
 
 const struct profile *session_profile(const struct session *s);
 const char *session_link(const struct session *s);
 struct message *session_message(const struct session *s); // NULL on a bus
-struct profile_data *session_data(struct session *s);      // to look at and to set what is sent
+struct profile_data *session_data(struct session *s);     // to look at and to set what is sent
 // Sets a value that is to be sent; names the profile lacks, and "", are ignored.
 void session_put(struct session *s, const char *name, double number);
 double session_number(const struct session *s, const char *name); // NAN: not known
@@ -43,12 +44,13 @@ int session_ask_one(struct session *s, const char *name, struct gon_error *err);
 // One try, for when telling again is worth more than asking again.
 int session_ask_once(struct session *s, const struct profile_asks *asks, struct gon_error *err);
 // An exchange or write that sets something. params: $NAMEs of a write; NULL. GON_E_INPUT: a value
-// beyond its range, nothing was sent. GON_E_REFUSED or GON_E_DEVICE: it was refused (session_meaning
-// says how), or reads back another value. GON_E_LINK: the answer was lost and the read-back, where
-// there is one, does not show it.
+// beyond its range, nothing was sent. GON_E_REFUSED or GON_E_DEVICE: it was refused
+// (session_meaning says how), or reads back another value. GON_E_LINK: the answer was lost and the
+// read-back, where there is one, does not show it.
 int session_send(struct session *s, const char *name, const struct profile_param *params,
                  struct gon_error *err);
-// Message only: sent whatever was cancelled and whatever the link's state; at_once: whatever the gap.
+// Message only: sent whatever was cancelled and whatever the link's state; at_once: whatever the
+// gap.
 int session_send_blind(struct session *s, const char *text, bool at_once, struct gon_error *err);
 
 enum profile_meaning session_meaning(const struct session *s); // of the last refusal

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <cmocka.h>
 #include <fcntl.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -345,6 +346,65 @@ static void whole_numbers_are_written_out(void **state)
     assert_string_equal(h.text, "c.cfg:1: seed = -1: out of range; allowed 0..2147483647\n");
 }
 
+// --- what instruments need -----------------------------------------------------------------------
+
+struct wire {
+    char end[8];
+    uint32_t address;
+    char asks[3][8];
+    int asks_count;
+};
+static const struct cfg_row wire_rows[] = {
+    {"end", CFG_BYTES, .offset = offsetof(struct wire, end), .size = 8, .fallback = ""},
+    {"address", CFG_HEX, .offset = offsetof(struct wire, address), .max = 0xffff, .fallback = "7"},
+    {"asks", CFG_STRINGS, .offset = offsetof(struct wire, asks), .size = 3, .stride = 8,
+     .count_offset = offsetof(struct wire, asks_count), .fallback = ""},
+    {0}};
+
+static int take_wire(const char *text, struct wire *w, struct heard *h)
+{
+    *h = (struct heard){0};
+    struct cfg_file *f = cfg_parse(text, "w.cfg", (struct cfg_sink){hear, h});
+    assert_non_null(f);
+    int mistakes = cfg_take(f, wire_rows, w);
+    cfg_close(f);
+    return mistakes;
+}
+
+static void bytes_hexadecimal_numbers_and_lists_of_texts_are_taken(void **state)
+{
+    struct wire w = {0};
+    struct heard h;
+    (void)state;
+    assert_int_equal(
+        take_wire("end = \"\\r\\n\\x1b\"; address = 0x007E; asks = ( \"a\", \"bc\" );", &w, &h), 0);
+    assert_string_equal(w.end, "\r\n\x1b");
+    assert_int_equal(w.address, 0x7e);
+    assert_int_equal(w.asks_count, 2);
+    assert_string_equal(w.asks[1], "bc");
+    assert_int_equal(take_wire("address = 126; asks = \"x\";", &w, &h), 0);
+    assert_int_equal(w.address, 126);
+    assert_int_equal(w.asks_count, 1);
+    assert_int_equal(take_wire("", &w, &h), 0);
+    assert_int_equal(w.address, 7);
+    assert_int_equal(w.asks_count, 0);
+    assert_string_equal(w.end, "");
+}
+
+static void their_mistakes_are_said(void **state)
+{
+    struct wire w;
+    struct heard h;
+    (void)state;
+    assert_int_equal(take_wire("address = 0x10000007E;", &w, &h), 1);
+    assert_non_null(strstr(h.text, "address = 0x10000007E: out of range; allowed 0..65535"));
+    assert_int_equal(take_wire("asks = ( \"a\", 3, \"12345678\" );", &w, &h), 2);
+    assert_non_null(strstr(h.text, "asks[1] = 3: not a text"));
+    assert_non_null(strstr(h.text, "asks[2] = \"12345678\": 8 bytes long; at most 7"));
+    assert_int_equal(take_wire("asks = ( \"a\", \"a\", \"a\", \"a\" );", &w, &h), 1);
+    assert_non_null(strstr(h.text, "4 texts; at most 3 are allowed"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -361,6 +421,8 @@ int main(void)
         cmocka_unit_test(others_can_complain_too),
         cmocka_unit_test(the_table_describes_itself),
         cmocka_unit_test(whole_numbers_are_written_out),
+        cmocka_unit_test(bytes_hexadecimal_numbers_and_lists_of_texts_are_taken),
+        cmocka_unit_test(their_mistakes_are_said),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
