@@ -260,6 +260,11 @@ static const char *alarm_text(int code)
     return code ? "not in the list of alarms" : "no alarm";
 }
 
+static const struct link_stats *az_stats(const struct axis *a)
+{
+    return bus_stats(((const struct az *)a)->bus);
+}
+
 static void az_free(struct axis *a)
 {
     free(a);
@@ -267,8 +272,8 @@ static void az_free(struct axis *a)
 
 struct axis *axis_az_new(struct bus *bus, int unit)
 {
-    static const struct axis_ops ops = {identify, status,      move_abs,   stop,
-                                        home,     reset_alarm, alarm_text, az_free};
+    static const struct axis_ops ops = {identify,    status,     move_abs, stop,   home,
+                                        reset_alarm, alarm_text, az_stats, az_free};
     struct az *z = calloc(1, sizeof *z);
     if (!z)
         return NULL;

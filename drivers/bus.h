@@ -23,11 +23,7 @@
 #include <stdint.h>
 
 struct bus;
-
-struct bus_stats {
-    uint64_t requests, retries, timeouts, garbled, exceptions, reopened;
-    int64_t last_latency_ns, worst_latency_ns;
-};
+struct link_stats;
 
 // timeout_ms: of one answer, 10..200 (the laser's lease allows no longer silence); quiet_ms: the
 // slowest answer a unit was ever seen to give, 20..5000.
@@ -46,4 +42,4 @@ int bus_read(struct bus *b, int unit, int address, int count, uint16_t *ret_regi
 int bus_write(struct bus *b, int unit, int address, int count, const uint16_t *registers,
               struct gon_error *err);
 const char *bus_link(const struct bus *b);
-const struct bus_stats *bus_stats(const struct bus *b);
+const struct link_stats *bus_stats(const struct bus *b);

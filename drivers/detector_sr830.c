@@ -97,9 +97,11 @@ static int set(struct sr830 *z, const char *name, int value, int most, struct go
         rc = ask_events(z, &events, err);
     if (rc < 0)
         return rc;
-    if (now != value || (events & ESR_REFUSED))
+    if (now != value || (events & ESR_REFUSED)) {
+        message_refused(z->m);
         return gon_fail(err, GON_E_DEVICE, "%s: refuses %s %d (it reads back %d, *ESR? is %d)",
                         transport_link(message_transport(z->m)), name, value, now, events);
+    }
     return 0;
 }
 
@@ -270,6 +272,11 @@ static int sr830_reopen(struct detector *d, struct gon_error *err)
     return message_reopen(sr_of(d)->m, err);
 }
 
+static const struct link_stats *sr830_stats(const struct detector *d)
+{
+    return message_stats(((const struct sr830 *)d)->m);
+}
+
 static void sr830_free(struct detector *d)
 {
     if (!d)
@@ -290,6 +297,7 @@ int detector_sr830_open(const char *link, struct clk *clk, const struct cancel *
                                             .clear = clear,
                                             .condition = condition,
                                             .reopen = sr830_reopen,
+                                            .stats = sr830_stats,
                                             .free = sr830_free};
     struct transport *t;
     int rc = transport_open(link, clk, cancel, &t, err);

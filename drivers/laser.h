@@ -14,6 +14,7 @@
 #include <stddef.h>
 
 struct laser;
+struct link_stats;
 
 enum laser_state {
     LASER_OFF,
@@ -48,6 +49,7 @@ struct laser_ops {
     int (*off)(struct laser *l, struct gon_error *err);
     int (*reopen)(struct laser *l, struct gon_error *err);
     const char *(*fault_text)(int code);
+    const struct link_stats *(*stats)(const struct laser *l); // NULL: it has no link
     void (*free)(struct laser *l);
 };
 

@@ -108,8 +108,10 @@ static int tell(struct cobolt *c, const char *command, struct gon_error *err)
     int rc = message_query(c->m, command, answer, sizeof answer, err);
     if (rc < 0 || strcmp(answer, "OK") == 0)
         return rc;
-    if (strncasecmp(answer, "syntax error", 12) == 0 || strncasecmp(answer, "error", 5) == 0)
+    if (strncasecmp(answer, "syntax error", 12) == 0 || strncasecmp(answer, "error", 5) == 0) {
+        message_refused(c->m);
         return gon_fail(err, GON_E_DEVICE, "%s: refuses '%s': %s", link_of(c), command, answer);
+    }
     message_out_of_step(c->m, "not an answer to a setting");
     return gon_fail(err, GON_E_LINK, "%s: '%s' was answered '%.80s', not OK", link_of(c), command,
                     answer);
@@ -360,6 +362,11 @@ static int cobolt_reopen(struct laser *l, struct gon_error *err)
     return message_reopen(c->m, err);
 }
 
+static const struct link_stats *cobolt_stats(const struct laser *l)
+{
+    return message_stats(((const struct cobolt *)l)->m);
+}
+
 static void cobolt_free(struct laser *l)
 {
     if (!l)
@@ -371,8 +378,9 @@ static void cobolt_free(struct laser *l)
 int laser_cobolt_open(const char *link, struct clk *clk, const struct cancel *cancel,
                       struct laser **ret_laser, struct gon_error *err)
 {
-    static const struct laser_ops ops = {identify, status, emission, set_power,  on,
-                                         off,      cobolt_reopen, fault_text, cobolt_free};
+    static const struct laser_ops ops = {identify,     status,     emission,      set_power,
+                                         on,           off,        cobolt_reopen, fault_text,
+                                         cobolt_stats, cobolt_free};
     struct transport *t;
     int rc = transport_open(link, clk, cancel, &t, err);
     if (rc < 0)

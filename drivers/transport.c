@@ -23,7 +23,7 @@ struct transport {
     struct serial_port *serial; // NULL: TCP, or closed
     int fd;                     // -1: closed
     int64_t turn_ns;            // when the clock last had its turn
-    struct transport_stats stats;
+    struct link_stats stats;
 };
 
 // Errors after which a descriptor never recovers.
@@ -121,6 +121,7 @@ int transport_reopen(struct transport *t, struct gon_error *err)
 int transport_hung_up(struct transport *t, int error, struct gon_error *err)
 {
     shut(t);
+    t->stats.errors[LINK_HUNG_UP]++;
     return gon_fail(err, GON_E_GONE, "%s: %s (%s)", t->text,
                     t->link.serial ? "unplugged" : "the connection is broken",
                     error ? strerror(error) : "hung up");
@@ -252,7 +253,7 @@ const char *transport_link(const struct transport *t)
     return t->text;
 }
 
-const struct transport_stats *transport_stats(const struct transport *t)
+const struct link_stats *transport_stats(const struct transport *t)
 {
     return &t->stats;
 }
@@ -279,14 +280,7 @@ const struct cancel *transport_cancel(const struct transport *t)
     return t->cancel;
 }
 
-struct transport_stats *transport_book(struct transport *t)
+struct link_stats *transport_book(struct transport *t)
 {
     return &t->stats;
-}
-
-void transport_latency(struct transport *t, int64_t latency_ns)
-{
-    t->stats.last_latency_ns = latency_ns;
-    if (latency_ns > t->stats.worst_latency_ns)
-        t->stats.worst_latency_ns = latency_ns;
 }

@@ -15,18 +15,13 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/err.h"
+#include "drivers/link_stats.h"
 
 #include <stddef.h>
 #include <stdint.h>
 
 struct transport;
 struct link;
-
-// What a link has seen since it was opened first; kept across reopening.
-struct transport_stats {
-    uint64_t bytes_out, bytes_in, queries, timeouts, garbled, reopened;
-    int64_t last_latency_ns, worst_latency_ns;
-};
 
 // GON_E_INPUT: the link's text is wrong. GON_E_GONE: no such port or host. GON_E_REFUSED: in use.
 // Connecting takes at most 2 s, in slices. The name of a host is looked up, which may take longer:
@@ -53,7 +48,7 @@ int transport_read(struct transport *t, void *data, size_t size, int64_t deadlin
 int transport_drain(struct transport *t, int64_t quiet_ns, struct gon_error *err);
 
 const char *transport_link(const struct transport *t);
-const struct transport_stats *transport_stats(const struct transport *t);
+const struct link_stats *transport_stats(const struct transport *t);
 
 // --- for the other modules of this layer ---------------------------------------------------------
 int transport_fd(const struct transport *t); // -1: hung up or not reopened
@@ -61,8 +56,7 @@ struct clk *transport_clk(const struct transport *t);
 // What must be sent whatever was cancelled (OFF, STOP) goes with NULL. Returns the token before.
 const struct cancel *transport_mind(struct transport *t, const struct cancel *cancel);
 const struct cancel *transport_cancel(const struct transport *t);
-struct transport_stats *transport_book(struct transport *t);
-void transport_latency(struct transport *t, int64_t latency_ns); // enters one into the book
+struct link_stats *transport_book(struct transport *t); // what I/O elsewhere has to enter
 // Whoever did I/O on transport_fd and met an error that means "gone" says so: closes, returns
 // GON_E_GONE.
 int transport_hung_up(struct transport *t, int error, struct gon_error *err);

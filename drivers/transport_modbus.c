@@ -9,9 +9,12 @@
 
 #define BYTE_GAP_MS 50
 
+enum { UNIT_AND_CRC = 3, MBAP = 7, EXCEPTION = 2 }; // bytes around a PDU, and of one
+
 struct modbus_master {
     modbus_t *library;
     struct transport *t;
+    bool rtu;
 };
 
 struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeout_ms)
@@ -27,6 +30,7 @@ struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeo
         return NULL;
     }
     m->t = t;
+    m->rtu = rtu;
     const int byte_ms = timeout_ms < BYTE_GAP_MS ? timeout_ms : BYTE_GAP_MS;
     modbus_set_response_timeout(m->library, (uint32_t)timeout_ms / 1000,
                                 (uint32_t)(timeout_ms % 1000) * 1000);
@@ -89,7 +93,19 @@ static enum master_outcome outcome(struct modbus_master *m, int rc)
         transport_hung_up(m->t, 0, NULL);
         return MASTER_GONE;
     }
-    return error == ETIMEDOUT || error == EAGAIN ? MASTER_SILENT : MASTER_GARBLED;
+    if (error == ETIMEDOUT || error == EAGAIN)
+        return MASTER_SILENT;
+    return error == EMBBADCRC ? MASTER_GARBLED : MASTER_MISFIT;
+}
+
+// libmodbus does not say what it moved. What it could not use is not counted as received.
+static void count_bytes(struct modbus_master *m, enum master_outcome o, int request, int answer)
+{
+    struct link_stats *book = transport_book(m->t);
+    const int around = m->rtu ? UNIT_AND_CRC : MBAP;
+    book->bytes_out += (uint64_t)(around + request);
+    if (o < MASTER_SILENT)
+        book->bytes_in += (uint64_t)(around + (o == MASTER_DONE ? answer : EXCEPTION));
 }
 
 enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int address, int count,
@@ -100,6 +116,7 @@ enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int ad
     errno = 0;
     enum master_outcome o =
         outcome(m, modbus_read_registers(m->library, address, count, registers));
+    count_bytes(m, o, 5, 2 + 2 * count);
     for (int i = 0; o == MASTER_DONE && i < count; i++)
         ret_registers[i] = registers[i];
     return o;
@@ -110,5 +127,8 @@ enum master_outcome modbus_master_write(struct modbus_master *m, int unit, int a
 {
     modbus_set_slave(m->library, unit);
     errno = 0;
-    return outcome(m, modbus_write_registers(m->library, address, count, registers));
+    enum master_outcome o =
+        outcome(m, modbus_write_registers(m->library, address, count, registers));
+    count_bytes(m, o, 6 + 2 * count, 5);
+    return o;
 }

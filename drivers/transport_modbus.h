@@ -16,7 +16,8 @@ enum master_outcome {
     MASTER_DONE = 0,
     // 1..11: the exception code of the answer
     MASTER_SILENT = 100, // no answer in time
-    MASTER_GARBLED,      // CRC, length, unit, function or transaction do not fit
+    MASTER_GARBLED,      // its checksum is wrong
+    MASTER_MISFIT,       // length, unit, function or transaction do not fit
     MASTER_GONE          // the transport is closed now
 };
 
@@ -38,7 +39,7 @@ void modbus_master_free(struct modbus_master *m);
 // libmodbus' select(): GON_E_SYSTEM. GON_E_GONE when the transport is closed.
 int modbus_master_attach(struct modbus_master *m, struct gon_error *err);
 
-// Functions 3 and 16.
+// Functions 3 and 16. Bytes are entered into the transport's book.
 enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int address, int count,
                                        uint16_t *ret_registers);
 enum master_outcome modbus_master_write(struct modbus_master *m, int unit, int address, int count,

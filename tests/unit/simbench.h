@@ -8,6 +8,7 @@
 #include "drivers/axis.h"
 #include "drivers/detector.h"
 #include "drivers/laser.h"
+#include "drivers/link_stats.h"
 #include "sim/world.h"
 
 #include <math.h>
@@ -39,6 +40,7 @@ struct simbench {
     struct simbench_axis axis[INSTRUMENT_AXES];
     struct laser laser;
     struct detector detector;
+    struct link_stats bus; // as the axes' bus would keep it; the others have no link
     int range;
     double step_delay_s; // virtual time each call costs
 
@@ -185,6 +187,11 @@ static inline int simbench_axis_reset(struct axis *a, struct gon_error *err)
 static inline const char *simbench_alarm_text(int code)
 {
     return code == 0x30 ? "overload" : "";
+}
+
+static inline const struct link_stats *simbench_axis_stats(const struct axis *a)
+{
+    return &((const struct simbench_axis *)a)->bench->bus;
 }
 
 static inline void simbench_axis_free(struct axis *a)
@@ -412,8 +419,9 @@ static inline void simbench_detector_free(struct detector *d)
 static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
 {
     static const struct axis_ops axis_ops = {
-        simbench_axis_identify, simbench_axis_status, simbench_axis_move,  simbench_axis_stop,
-        simbench_axis_home,     simbench_axis_reset,  simbench_alarm_text, simbench_axis_free};
+        simbench_axis_identify, simbench_axis_status, simbench_axis_move,
+        simbench_axis_stop,     simbench_axis_home,   simbench_axis_reset,
+        simbench_alarm_text,    simbench_axis_stats,  simbench_axis_free};
     static const struct laser_ops laser_ops = {.identify = simbench_laser_identify,
                                                .status = simbench_laser_status,
                                                .emission = simbench_laser_emission,

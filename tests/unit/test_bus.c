@@ -98,7 +98,10 @@ static void registers_are_read_and_written(void **state)
     assert_int_equal(bus_write(b, 1, 5, 2, (const uint16_t[]){7, 8}, NULL), 0);
     assert_int_equal(slave.registers[0][6], 8);
     assert_int_equal(bus_stats(b)->requests, 2);
-    assert_int_equal(bus_stats(b)->last_latency_ns, MS(2));
+    assert_int_equal(bus_stats(b)->latency_last_ns, MS(2));
+    assert_int_equal(bus_stats(b)->bytes_out, 8 + 13);
+    assert_int_equal(bus_stats(b)->bytes_in, 11 + 8);
+    assert_int_equal(link_stats_failures(bus_stats(b)), 0);
     bus_close(b);
 }
 
@@ -161,7 +164,7 @@ static void exceptions_name_function_address_and_count(void **state)
     slave.exceptions_left = 1;
     assert_int_equal(bus_write(b, 2, 0, 1, r, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "exception 4; function 16"));
-    assert_int_equal(bus_stats(b)->exceptions, 2);
+    assert_int_equal(bus_stats(b)->errors[LINK_REFUSED], 2);
     bus_close(b);
 }
 
@@ -208,7 +211,7 @@ static void a_lost_answer_repeats_reads_but_never_writes(void **state)
     slave.m.port.drop = 2;
     assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
     assert_int_equal(bus_stats(b)->retries, 2);
-    assert_int_equal(bus_stats(b)->timeouts, 2);
+    assert_int_equal(bus_stats(b)->errors[LINK_SILENT], 2);
 
     slave.m.port.drop = 1;
     assert_int_equal(bus_write(b, 1, 0, 1, (const uint16_t[]){77}, &err), GON_E_LINK);
@@ -246,7 +249,7 @@ static void what_comes_unasked_is_dropped_before_a_request(void **state)
     port_send(&slave.m.port, "\1\3\4\0", 4, vline.clk.t_ns);
     assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
     assert_int_equal(r[0], 1000);
-    assert_int_equal(bus_stats(b)->garbled, 1);
+    assert_int_equal(bus_stats(b)->errors[LINK_STRAY], 1);
     assert_int_equal(bus_stats(b)->retries, 0);
     bus_close(b);
 }
@@ -279,7 +282,7 @@ static void feed_forged(struct port *p, const uint8_t *bytes, size_t size, int64
     }
 }
 
-static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error)
+static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error, enum link_error kind)
 {
     static const struct port_ops ops = {feed_forged, scripted_nothing, scripted_hangup};
     struct port p;
@@ -295,17 +298,21 @@ static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error)
     assert_int_equal(r[0], 1000);
     assert_int_equal(r[1], 1001);
     assert_int_equal(bus_stats(b)->retries, 1);
+    assert_int_equal(bus_stats(b)->resyncs, 1);
+    assert_int_equal(bus_stats(b)->errors[kind], 1);
+    assert_int_equal(link_stats_failures(bus_stats(b)), 1);
+    assert_int_equal(link_stats_answers(bus_stats(b)), 1);
     bus_close(b);
 }
 
 static void wrong_unit_function_length_or_checksum_is_no_answer(void **state)
 {
     (void)state;
-    check_forged((const uint8_t[]){2, 3, 4, 0, 9, 0, 9}, 7, 0);
-    check_forged((const uint8_t[]){1, 4, 4, 0, 9, 0, 9}, 7, 0);
-    check_forged((const uint8_t[]){1, 3, 2, 0, 9}, 5, 0);
-    check_forged((const uint8_t[]){1, 3, 6, 0, 9, 0, 9, 0, 9}, 9, 0);
-    check_forged((const uint8_t[]){1, 3, 4, 0, 9, 0, 9}, 7, 0x0100);
+    check_forged((const uint8_t[]){2, 3, 4, 0, 9, 0, 9}, 7, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 4, 4, 0, 9, 0, 9}, 7, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 3, 2, 0, 9}, 5, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 3, 6, 0, 9, 0, 9, 0, 9}, 9, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 3, 4, 0, 9, 0, 9}, 7, 0x0100, LINK_GARBLED);
 }
 
 static void a_hang_up_is_gone_and_a_new_plug_works(void **state)
@@ -327,6 +334,7 @@ static void a_hang_up_is_gone_and_a_new_plug_works(void **state)
     slave.m.port.mute = false;
     assert_int_equal(bus_reopen(b, &err), 0);
     assert_int_equal(bus_read(b, 1, 0, 2, r, &err), 0);
+    assert_int_equal(bus_stats(b)->errors[LINK_HUNG_UP], 1);
     assert_int_equal(bus_stats(b)->reopened, 1);
     bus_close(b);
 }
@@ -442,7 +450,7 @@ static void tcp_reconnects_after_a_late_answer(void **state)
     assert_int_equal(bus_read(b, 2, 10, 4, r, &err), 0);
     assert_int_equal(r[3], 2013);
     assert_int_equal(bus_stats(b)->reopened, 1);
-    assert_int_equal(bus_stats(b)->timeouts, 1);
+    assert_int_equal(bus_stats(b)->errors[LINK_SILENT], 1);
     assert_int_equal(bus_read(b, 1, 20, 2, r, &err), 0);
     assert_int_equal(r[1], 1021);
     assert_int_equal(bus_stats(b)->reopened, 1);
