@@ -4,6 +4,7 @@
 #include "campaign/bench.h"
 #include "daemon/instrument_inside.h"
 #include "drivers/bus.h"
+#include "drivers/device.h"
 
 #include <assert.h>
 #include <math.h>
@@ -12,8 +13,6 @@
 #include <string.h>
 
 #define SLICE_NS CLK_MS(100)
-#define BACKOFF_LEAST_NS CLK_MS(200)
-#define BACKOFF_MOST_NS CLK_S(2)
 #define QUIET_MS 100 // the slowest answer of a unit that is to be drained after an error
 
 static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser",
@@ -82,12 +81,14 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc, st
             p->returns++;
         p->link = PART_OK;
         p->problem[0] = 0;
-        in->backoff_ns[part] = 0;
+        backoff_reset(&in->retry[part]);
         return rc;
     }
     p->errors++;
     err->code = (enum gon_code)rc;
     gon_prefix(err, "%s%s", part < INSTRUMENT_AXES ? "axis " : "", p->name);
+    snprintf(p->last_error, sizeof p->last_error, "%.*s", (int)sizeof p->last_error - 1, err->text);
+    p->last_error_ns = instrument_now_ns(in);
     if (rc == GON_E_LINK || rc == GON_E_GONE) {
         p->link = PART_LOST;
         snprintf(p->problem, sizeof p->problem, "%.*s", (int)sizeof p->problem - 1, err->text);
@@ -124,28 +125,32 @@ enum instrument_part instrument_lost(const struct instrument *in)
     return part;
 }
 
-static int connect_bus(struct instrument *in, struct motor *m, int unit, struct gon_error *err)
+static int make_axis(struct instrument *in, struct motor *m, struct gon_error *err)
+{
+    return device_new_axis(bench_axis_drivers[m->config->driver], in->bus[m->bus], m->config->unit,
+                           &m->axis, err);
+}
+
+static int connect_bus(struct instrument *in, struct motor *m, struct gon_error *err)
 {
     const struct bench_bus *config = &in->bench->buses[m->bus];
     struct bus **bus = &in->bus[m->bus];
     int rc = *bus ? bus_reopen(*bus, err)
                   : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL,
                              bus, err);
-    if (rc >= 0 && !m->axis && !(m->axis = axis_az_new(*bus, unit)))
-        return gon_fail(err, GON_E_SYSTEM, "out of memory");
-    return rc;
+    return rc < 0 || m->axis ? rc : make_axis(in, m, err);
 }
 
 // Units share their bus: the bus is only reopened when the unit does not answer on it as it is.
 static int connect_axis(struct instrument *in, enum instrument_part part, struct gon_error *err)
 {
     struct motor *m = &in->motor[part];
-    if (!m->axis && m->bus >= 0 && in->bus[m->bus] &&
-        !(m->axis = axis_az_new(in->bus[m->bus], m->config->unit)))
-        return gon_fail(err, GON_E_SYSTEM, "out of memory");
-    int rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
+    int rc = GON_OK;
+    if (!m->axis && m->bus >= 0 && in->bus[m->bus] && (rc = make_axis(in, m, err)) < 0)
+        return rc;
+    rc = m->axis ? m->axis->ops->identify(m->axis, err) : GON_E_GONE;
     if (rc < 0 && m->bus >= 0) {
-        rc = connect_bus(in, m, m->config->unit, err);
+        rc = connect_bus(in, m, err);
         if (rc >= 0)
             rc = m->axis->ops->identify(m->axis, err);
     }
@@ -163,7 +168,7 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = laser_cobolt_open(p->address, &in->breathing.clk, NULL, &laser, err);
+    int rc = device_open_laser(p->driver, p->address, &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
@@ -183,9 +188,9 @@ int instrument_write_set_up(struct instrument *in, struct gon_error *err)
 static int connect_detector(struct instrument *in, struct gon_error *err)
 {
     struct part_state *p = &in->part[PART_DETECTOR];
-    int rc = in->detector
-                 ? in->detector->ops->reopen(in->detector, err)
-                 : detector_sr830_open(p->address, &in->breathing.clk, NULL, &in->detector, err);
+    int rc = in->detector ? in->detector->ops->reopen(in->detector, err)
+                          : device_open_detector(p->driver, p->address, &in->breathing.clk, NULL,
+                                                 &in->detector, err);
     if (rc >= 0)
         rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
     return rc < 0 ? rc : instrument_write_set_up(in, err);
@@ -232,8 +237,10 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     in->sample = (struct detector_sample){(double)NAN, (double)NAN, (double)NAN};
     in->laser = (struct laser_status){.power_w = (double)NAN, .setpoint_w = (double)NAN};
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
-        in->part[part] =
-            (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
+        in->part[part] = (struct part_state){
+            .name = part_names[part], .link = PART_LOST, .driver = "", .address = ""};
+    in->part[PART_LASER].driver = bench_laser_drivers[bench->laser.driver];
+    in->part[PART_DETECTOR].driver = bench_detector_drivers[bench->detector.driver];
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         struct motor *m = &in->motor[part];
         *m = (struct motor){.config = bench_find_axis(bench, part_names[part]),
@@ -241,7 +248,9 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
                             .commanded = (double)NAN,
                             .seen_ns = INT64_MIN,
                             .place = {.position = (double)NAN, .target = (double)NAN}};
-        if (!m->config)
+        if (m->config)
+            in->part[part].driver = bench_axis_drivers[m->config->driver];
+        else
             in->part[part].link = PART_ABSENT;
     }
     return in;
@@ -330,6 +339,18 @@ const struct bench_config *instrument_bench(const struct instrument *in)
     return in->bench;
 }
 
+static const struct link_stats *stats_of(const struct instrument *in, enum instrument_part part)
+{
+    if (!is_part_there(in, part))
+        return NULL;
+    if (part == PART_LASER)
+        return safety_stats(in->safety);
+    if (part == PART_DETECTOR)
+        return in->detector->ops->stats ? in->detector->ops->stats(in->detector) : NULL;
+    const struct axis *a = in->motor[part].axis;
+    return a->ops->stats ? a->ops->stats(a) : NULL;
+}
+
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot)
 {
     struct instrument_snapshot *s = ret_snapshot;
@@ -345,11 +366,19 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
         .time_constant_s = in->time_constant_s,
     };
     memcpy(s->part, in->part, sizeof s->part);
+    for (enum instrument_part part = 0; part < PART_COUNT; part++) {
+        const struct link_stats *stats = stats_of(in, part);
+        if (stats)
+            s->part[part].stats = *stats;
+    }
     for (int i = 0; i < INSTRUMENT_AXES; i++) {
         const struct motor *m = &in->motor[i];
         s->axis[i].unit = m->config ? m->config->unit_name : "";
         s->axis[i].position = m->place.position;
         s->axis[i].target = m->commanded;
+        s->axis[i].dial = m->config ? m->place.position - m->config->zero : (double)NAN;
+        s->axis[i].steps =
+            m->config ? round(s->axis[i].dial * m->config->steps_per_unit) : (double)NAN;
         s->axis[i].moving = m->place.moving;
         s->axis[i].homed = m->place.homed;
         s->axis[i].alarm = m->place.alarm;
@@ -381,14 +410,9 @@ static void ask(struct instrument *in, enum instrument_part part)
 
 static void try_again(struct instrument *in, enum instrument_part part)
 {
-    const int64_t now_ns = instrument_now_ns(in);
-    if (now_ns < in->retry_ns[part] || instrument_connect(in, part, NULL) >= 0)
-        return;
-    int64_t *backoff_ns = &in->backoff_ns[part];
-    *backoff_ns = *backoff_ns ? 2 * *backoff_ns : BACKOFF_LEAST_NS;
-    if (*backoff_ns > BACKOFF_MOST_NS)
-        *backoff_ns = BACKOFF_MOST_NS;
-    in->retry_ns[part] = instrument_now_ns(in) + *backoff_ns;
+    if (backoff_due(&in->retry[part], instrument_now_ns(in)) &&
+        instrument_connect(in, part, NULL) < 0)
+        backoff_failed(&in->retry[part], instrument_now_ns(in));
 }
 
 int instrument_reconnect(struct instrument *in)

@@ -18,6 +18,7 @@
 #include "drivers/axis.h"
 #include "drivers/detector.h"
 #include "drivers/laser.h"
+#include "drivers/link_stats.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -41,11 +42,15 @@ enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 struct part_state {
     const char *name;    // "theta_i", "theta_r", "sample", "laser", "detector"
     enum part_link link; // PART_ABSENT: the bench has none
+    const char *driver;  // as the bench file names it; "": absent
     const char *address; // of its link; "" when made from ready objects
     char identity[96];   // what it said it is
     char problem[240];   // why it is lost; "" when it is not
     uint64_t errors;     // failed calls since the start
     uint64_t returns;    // times it came back
+    char last_error[240]; // "" when there was none since the start
+    int64_t last_error_ns;
+    struct link_stats stats; // of its link, which others may share; zero without one
 };
 
 // Everything that is known of the bench, as of the last time each part was asked.
@@ -55,6 +60,7 @@ struct instrument_snapshot {
     struct {
         const char *unit;        // "deg", "mm"
         double position, target; // user units; NAN: not known
+        double dial, steps;      // the same position without the zero offset, and as counted
         bool moving, homed, alarm;
         int alarm_code;
     } axis[INSTRUMENT_AXES];
@@ -101,7 +107,7 @@ int64_t instrument_now_ns(const struct instrument *in);
 int64_t instrument_utc_ns(const struct instrument *in);
 
 // For an instrument that runs nothing, about once a second: asks every part that is there how it is
-// and tries once to bring back one that is lost (paced, 0.2 to 2 s). Repeats an unconfirmed off.
+// and tries once to bring back one that is lost (paced, 0.1 to 5 s). Repeats an unconfirmed off.
 // Returns the number of parts lost. instrument_reconnect is all of it but the asking.
 int instrument_tend(struct instrument *in);
 int instrument_reconnect(struct instrument *in);

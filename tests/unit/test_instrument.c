@@ -81,7 +81,7 @@ static void what_is_not_there_is_lost_by_name_and_comes_back(void **state)
     assert_string_equal(err.text, "detector: hung up");
     while (s->b.clk.t_ns < CLK_S(20) && instrument_tend(s->in) > 0)
         clk_sleep(&s->b.clk.clk, CLK_MS(100), NULL);
-    assert_true(s->b.clk.t_ns < CLK_S(6 + 2.2)); // tried at most 2 s apart
+    assert_true(s->b.clk.t_ns < CLK_S(6 + 5.2)); // tried at most 5 s apart
     instrument_snapshot(s->in, &s->now);
     for (int i = 0; i < PART_COUNT; i++) {
         assert_int_equal(s->now.part[i].link, PART_OK);
@@ -99,12 +99,12 @@ static void tries_to_reconnect_are_paced(void **state)
     s->b.gone_until_ns[SIMBENCH_DETECTOR] = INT64_MAX;
     instrument_tend(s->in);
     const long calls = s->b.calls;
-    for (int i = 0; i < 1000; i++) { // 10 s
+    for (int i = 0; i < 2000; i++) { // 20 s
         instrument_reconnect(s->in);
         clk_sleep(&s->b.clk.clk, CLK_MS(10), NULL);
     }
-    const long tries = s->b.calls - calls; // 0.2, 0.4, 0.8, 1.6, 2, 2, 2 s
-    assert_true(tries >= 6 && tries <= 8);
+    const long tries = s->b.calls - calls; // 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5, 5 s
+    assert_true(tries >= 8 && tries <= 9);
     end(s);
 }
 
@@ -137,6 +137,34 @@ static void an_off_that_was_not_confirmed_is_repeated_when_idle(void **state)
     instrument_snapshot(s->in, &s->now);
     assert_false(s->now.off_unconfirmed || s->now.emission);
     assert_false(sim_laser_emits(&s->b.world.laser));
+    end(s);
+}
+
+static void a_snapshot_tells_what_the_links_have_seen(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    make(s);
+    link_stats_answer(&s->b.bus, CLK_MS(3));
+    s->b.bus.errors[LINK_GARBLED] = 2;
+    s->b.fail_at = s->b.calls + 1;
+    s->b.fail_code = GON_E_LINK;
+    instrument_tend(s->in);
+    instrument_snapshot(s->in, &s->now);
+    for (int i = 0; i < INSTRUMENT_AXES; i++) {
+        assert_string_equal(s->now.part[i].driver, "oriental-az");
+        assert_int_equal(s->now.part[i].stats.errors[LINK_GARBLED], 2);
+        assert_int_equal(link_stats_answers(&s->now.part[i].stats), 1);
+    }
+    assert_int_equal(link_stats_answers(&s->now.part[PART_LASER].stats), 0);
+    assert_string_equal(s->now.part[PART_LASER].driver, "cobolt-05");
+    assert_string_equal(s->now.part[PART_DETECTOR].driver, "sr830");
+    // It is there again, and what was wrong is remembered with its time.
+    assert_int_equal(s->now.part[PART_THETA_I].link, PART_OK);
+    assert_string_equal(s->now.part[PART_THETA_I].problem, "");
+    assert_non_null(strstr(s->now.part[PART_THETA_I].last_error, "axis theta_i: injected"));
+    assert_int_equal(s->now.part[PART_THETA_I].last_error_ns, s->now.t_ns);
+    assert_string_equal(s->now.part[PART_THETA_R].last_error, "");
     end(s);
 }
 
@@ -182,6 +210,11 @@ static void user_units_have_zero_and_direction(void **state)
     assert_int_equal(instrument_place(s->in, PART_THETA_R, &p, &err), 0);
     assert_true(fabs(p.position - 20.0) < 1e-9);
     assert_true(fabs(instrument_rounded(s->in, PART_THETA_R, 20.0009) - 20.0) < 1e-9);
+    instrument_snapshot(s->in, &s->now);
+    assert_true(fabs(s->now.axis[PART_THETA_I].position - 11.5) < 1e-9);
+    assert_true(fabs(s->now.axis[PART_THETA_I].dial - 10.0) < 1e-9);
+    assert_true(s->now.axis[PART_THETA_I].steps == 10000 &&
+                s->now.axis[PART_THETA_R].steps == -10000);
     assert_int_equal(instrument_go(s->in, PART_THETA_R, -181, &err), GON_E_INPUT);
     assert_int_equal(instrument_go(s->in, PART_THETA_R, (double)NAN, &err), GON_E_INPUT);
     end(s);
@@ -253,6 +286,7 @@ int main(void)
         cmocka_unit_test(tries_to_reconnect_are_paced),
         cmocka_unit_test(a_laser_that_lights_by_itself_is_switched_off),
         cmocka_unit_test(an_off_that_was_not_confirmed_is_repeated_when_idle),
+        cmocka_unit_test(a_snapshot_tells_what_the_links_have_seen),
         cmocka_unit_test(waiting_renews_the_lease_every_100_ms),
         cmocka_unit_test(user_units_have_zero_and_direction),
         cmocka_unit_test(a_bench_without_a_sample_stage_has_none),
