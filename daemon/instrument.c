@@ -156,6 +156,8 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     }
     if (rc < 0)
         return rc;
+    struct part_state *p = &in->part[part];
+    snprintf(p->identity, sizeof p->identity, "unit %d", m->config->unit);
     m->engaged = m->config->backlash <= 0;
     m->commanded = (double)NAN;
     m->seen_ns = INT64_MIN;
