@@ -92,10 +92,8 @@ static void found(void *ctx, const struct finding *f)
 
 static void explain_lost(struct finding *f, const char *why)
 {
-    const struct gon_error err = {GON_E_GONE, ""};
-    const struct link none = {0};
-    explain_talk(f, &err, &none, "");
-    snprintf(f->what, sizeof f->what, "%s", why);
+    explain_look(f, "%s", why);
+    f->level = FINDING_WRONG;
     snprintf(f->why, sizeof f->why, "goniod cannot reach it and goes on trying");
     snprintf(f->todo, sizeof f->todo, "end goniod and ask again: doctor then looks itself");
 }
