@@ -87,17 +87,16 @@ static int meet_detector(const struct examine *e, const char *link, struct detec
 
 // --- who else may be on a port -------------------------------------------------------------------
 
-// The port of one link with the settings of another: "serial:" PATH of port, "?..." of settings.
+// A port as a text link with the settings of another: a serial port is opened at that one's baud.
 static void text_port(const char *port, const char *settings, char *ret_link, size_t size)
 {
-    const char *place = strchr(port, ':'), *set = strchr(settings, '?');
-    const bool serial = strncmp(port, "serial:", 7) == 0 || strncmp(port, "modbus-rtu:", 11) == 0;
-    if (serial)
-        snprintf(ret_link, size, "serial:%.*s%s", (int)strcspn(place + 1, "?"), place + 1,
-                 set && strncmp(settings, "serial:", 7) == 0 ? set : "");
+    const char *place = strchr(port, ':') + 1, *set = strchr(settings, '?');
+    if (strncmp(port, "serial:", 7) == 0 || strncmp(port, "modbus-rtu:", 11) == 0)
+        snprintf(ret_link, size, "serial:%.*s%s", (int)strcspn(place, "?"), place, set ? set : "");
+    else if (strncmp(port, "modbus-tcp:", 11) == 0)
+        snprintf(ret_link, size, "tcp:%s", place);
     else
-        snprintf(ret_link, size, "%s%s", strncmp(port, "modbus-tcp:", 11) == 0 ? "tcp" : "",
-                 strncmp(port, "modbus-tcp:", 11) == 0 ? place : port);
+        snprintf(ret_link, size, "%s", port);
 }
 
 static bool is_detector(const struct examine *e, const char *port, char ret_identity[IDENTITY])

@@ -3,6 +3,7 @@
 // The SR830 driver against the simulated instrument, in virtual time.
 #include "drivers/detector.h"
 
+#include "drivers/link_stats.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
 #include "tests/unit/vline.h"
@@ -157,6 +158,7 @@ static void a_setting_that_does_not_take_is_an_error(void **state)
     s.step = 1; // reads back as told, but complains
     assert_int_equal(d->ops->set_range(d, 26, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "refuses SENS 26 (it reads back 26, *ESR? is 16)"));
+    assert_int_equal(d->ops->stats(d)->errors[LINK_REFUSED], 2);
     d->ops->free(d);
 }
 

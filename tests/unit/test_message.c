@@ -379,12 +379,14 @@ static void asking_again_is_bounded(void **state)
     struct message *m = begin(&s, hear_late, NULL);
     assert_int_equal(message_ask_number(m, "v?", &value, &err), 0);
     assert_true(value == 2);
+    assert_int_equal(message_stats(m)->retries, 1);
     message_free(m);
 
     m = begin(&s, hear_nothing, NULL);
     value = -1;
     assert_int_equal(message_ask_number(m, "v?", &value, &err), GON_E_LINK);
     assert_int_equal(s.heard, 3); // the query, and two that tried to get into step
+    assert_int_equal(message_stats(m)->retries, 2);
     assert_true(value == -1);
     message_free(m);
 }
