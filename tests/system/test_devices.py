@@ -195,11 +195,11 @@ def test_readings_are_counted(start_sim, start_daemon):
     sim = start_sim("--fast", "--seed", "5", *QUICK_LASER)
     daemon = start_daemon("--config", sim.folder / "goniod.cfg")
     reply = daemon.submit()
-    events = daemon.follow(reply["event_id"])
-    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
+    reading = daemon.follow(reply["event_id"]).until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
     families = metrics(daemon)
     assert value(families, "gonio_run_state", state="running") == 1
     assert value(families, "gonio_laser_emission") == 1
     assert value(families, "gonio_run_number") == reply["run"]
-    done = events.until_state(reply["run"], "done")
-    assert value(metrics(daemon), "gonio_readings_total") >= done["total"] > 0
+    assert value(families, "gonio_run_readings") == reading["total"]
+    assert value(families, "gonio_run_readings_done") >= reading["done"] > 0
+    assert value(families, "gonio_readings_total") >= reading["done"], "darks and beams too"
