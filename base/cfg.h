@@ -26,6 +26,7 @@ enum cfg_type {
                 // list of one
     CFG_STRINGS, // char[size][stride], count at count_offset; control characters may be in them; a
                  // single text is a list of one
+    CFG_PAIRS,   // double[size][2], count at count_offset; ( (a, b), (a, b) ) in the file
     CFG_GROUP,  // nested struct: { }
     CFG_GROUPS  // array of structs: ( { }, { } )
 };

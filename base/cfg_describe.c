@@ -25,6 +25,7 @@ static const char *kind(const struct cfg_row *row)
         return "one of";
     case CFG_REALS:
         return "list of numbers";
+    case CFG_PAIRS: return "list of pairs of numbers";
     case CFG_GROUP:
         return "group";
     case CFG_GROUPS:
@@ -36,7 +37,8 @@ static const char *kind(const struct cfg_row *row)
 static void range(FILE *out, const struct cfg_row *row)
 {
     bool whole = row->type == CFG_INT || row->type == CFG_HEX;
-    bool number = whole || row->type == CFG_REAL || row->type == CFG_REALS;
+    bool number = whole || row->type == CFG_REAL || row->type == CFG_REALS ||
+                  row->type == CFG_PAIRS;
     int digits = whole ? 17 : 9; // whole numbers to the last digit
     if (!number || row->min == row->max)
         return;

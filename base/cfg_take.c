@@ -152,6 +152,38 @@ static int take_reals(const struct place *at, const config_setting_t *s, const s
     return mistakes;
 }
 
+static int take_pairs(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+{
+    if (!config_setting_is_list(s))
+        return wrong(at, s, "not a list of pairs; write ( (a, b), (a, b) )");
+    int count = config_setting_length(s), mistakes = 0;
+    double *values = member(at, row->offset);
+    if ((size_t)count > row->size)
+        return wrong(at, s, "%d pairs; at most %zu are allowed", count, row->size);
+    if (count == 0 && !row->fallback)
+        return wrong(at, s, "an empty list; give at least one pair");
+    for (int i = 0; i < count; i++) {
+        const config_setting_t *pair = config_setting_get_elem(s, (unsigned)i);
+        const struct place element = inner(at, NULL, i, NULL);
+        const bool list = config_setting_is_list(pair) || config_setting_is_array(pair);
+        if (!list || config_setting_length(pair) != 2) {
+            mistakes += wrong(&element, pair, "not a pair of numbers; write (a, b)");
+            continue;
+        }
+        for (int k = 0; k < 2; k++) {
+            const struct place number = inner(&element, NULL, k, NULL);
+            double value = (double)NAN;
+            mistakes +=
+                take_number(&number, config_setting_get_elem(pair, (unsigned)k), row, &value);
+            if (values)
+                values[2 * i + k] = value;
+        }
+    }
+    if (at->target)
+        *(int *)member(at, row->count_offset) = count;
+    return mistakes;
+}
+
 // --- words ---------------------------------------------------------------------------------------
 
 // Length of the UTF-8 sequence at p, 0 when it is none. No overlong forms, no surrogates.
@@ -279,6 +311,7 @@ static int take_row(const struct place *at, const config_setting_t *s, const str
         return take_choice(at, s, row);
     case CFG_REALS:
         return take_reals(at, s, row);
+    case CFG_PAIRS: return take_pairs(at, s, row);
     case CFG_GROUPS:
         return take_groups(at, s, row);
     case CFG_INT:
@@ -374,6 +407,7 @@ static void fall_back(const struct place *at, const struct cfg_row *row)
     case CFG_REALS:
         fall_back_reals(at, row, text);
         break;
+    case CFG_PAIRS:
     case CFG_GROUPS:
     case CFG_STRINGS:
         *(int *)member(at, row->count_offset) = 0;

@@ -405,6 +405,44 @@ static void their_mistakes_are_said(void **state)
     assert_non_null(strstr(h.text, "4 texts; at most 3 are allowed"));
 }
 
+static void pairs_are_lists_of_two(void **state)
+{
+    (void)state;
+    struct outline {
+        double corner[3][2];
+        int count;
+    } t = {.count = -1};
+    static const struct cfg_row rows[] = {{"corners", CFG_PAIRS, .size = 3,
+                                           .count_offset = offsetof(struct outline, count),
+                                           .unit = "deg", .min = -90, .max = 90},
+                                          {0}};
+    static const struct {
+        const char *text, *says;
+    } cases[] = {
+        {"corners = ( (1, -2.5), [3, 4] );", ""},
+        {"corners = ( (1, 2), (3, 4, 5), 6,\n (7, 95) );",
+         "c.cfg:1: corners = ( ... ): 4 pairs; at most 3 are allowed\n"},
+        {"corners = ( (3, 4, 5), 6,\n (\"7\", 95) );",
+         "c.cfg:1: corners[0] = ( ... ): not a pair of numbers; write (a, b)\n"
+         "c.cfg:1: corners[1] = 6: not a pair of numbers; write (a, b)\n"
+         "c.cfg:2: corners[2][0] = \"7\": not a number\n"
+         "c.cfg:2: corners[2][1] = 95: out of range; allowed -90..90 deg\n"},
+        {"corners = ( );", "c.cfg:1: corners = ( ... ): an empty list; give at least one pair\n"},
+        {"corners = [1, 2];",
+         "c.cfg:1: corners = [ ... ]: not a list of pairs; write ( (a, b), (a, b) )\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct heard h = {0};
+        struct cfg_file *f = cfg_parse(cases[i].text, "c.cfg", (struct cfg_sink){hear, &h});
+        const int mistakes = cfg_take(f, rows, &t);
+        cfg_close(f);
+        assert_string_equal(h.text, cases[i].says);
+        assert_int_equal(mistakes, h.lines);
+        assert_int_equal(t.count, 2); // of the first, that no other changed
+        assert_true(t.corner[0][0] == 1 && t.corner[0][1] == -2.5 && t.corner[1][1] == 4);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -423,6 +461,7 @@ int main(void)
         cmocka_unit_test(whole_numbers_are_written_out),
         cmocka_unit_test(bytes_hexadecimal_numbers_and_lists_of_texts_are_taken),
         cmocka_unit_test(their_mistakes_are_said),
+        cmocka_unit_test(pairs_are_lists_of_two),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
