@@ -2,6 +2,7 @@
 #include "campaign/plan.h"
 
 #include "base/units.h"
+#include "campaign/plan_bench.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -23,7 +24,8 @@ struct maker {
     struct plan plan;
     int points_room, skips_room;
     int64_t *directions_udeg; // of one sweep
-    const struct bench_axis *theta_i, *theta_r;
+    struct plan_bench at;     // where the bench stands after the last point
+    int skips_for[PLAN_SKIP_REASONS], skips_in[BENCH_KEEP_OUTS];
 };
 
 const char *plan_kind_name(enum plan_kind k)
@@ -34,7 +36,9 @@ const char *plan_kind_name(enum plan_kind k)
 
 const char *plan_skip_text(enum plan_skip_reason r)
 {
-    return r == PLAN_SKIP_BLIND ? "in the detector's shadow" : "beyond an axis's limits";
+    static const char *const texts[] = {"in the detector's shadow", "beyond an axis's limits",
+                                        "in a keep-out", "cut off by a keep-out"};
+    return texts[r];
 }
 
 void plan_clear(struct plan *p)
@@ -84,6 +88,7 @@ static int add_skip(struct maker *m, const struct plan_skip *skip, struct gon_er
         return gon_fail(err, GON_E_SYSTEM, "plan: out of memory");
     p->skips = larger;
     p->skips[p->skips_count++] = *skip;
+    m->skips_for[skip->reason]++;
     return GON_OK;
 }
 
@@ -138,11 +143,6 @@ static int directions(struct maker *m, double theta_i_deg)
     return unique;
 }
 
-static bool beyond(const struct bench_axis *axis, double deg)
-{
-    return axis && !(deg >= axis->min && deg <= axis->max);
-}
-
 static bool in_dense_zone(const struct campaign_config *c, double theta_i_deg, double theta_r_deg)
 {
     int64_t off = llabs(units_udeg(theta_r_deg) - units_udeg(theta_i_deg));
@@ -154,19 +154,34 @@ static bool in_shadow(const struct campaign_config *c, double theta_i_deg, doubl
     return llabs(units_udeg(theta_r_deg) + units_udeg(theta_i_deg)) < units_udeg(c->blind_half_deg);
 }
 
+// Whether the point is measured; if so, the bench stands there now. The axes' limits come before
+// the shadow.
+static bool takes(struct maker *m, double theta_i_deg, double theta_r_deg,
+                  enum plan_skip_reason *ret_reason)
+{
+    const bool shadow = in_shadow(m->config, theta_i_deg, theta_r_deg);
+    const struct plan_bench before = m->at;
+    int keep_out = -1;
+    const bool went = plan_bench_go(&m->at, theta_i_deg, theta_r_deg, ret_reason, &keep_out);
+    if (shadow && (went || *ret_reason != PLAN_SKIP_LIMITS)) {
+        m->at = before;
+        *ret_reason = PLAN_SKIP_BLIND;
+        return false;
+    }
+    m->skips_in[keep_out >= 0 ? keep_out : 0] += keep_out >= 0;
+    return went;
+}
+
 static int add_sweep(struct maker *m, int sweep, double theta_i_deg, struct gon_error *err)
 {
     const struct campaign_config *c = m->config;
     int n = directions(m, theta_i_deg), point = 0, rc = GON_OK;
     for (int k = 0; k < n && rc >= 0; k++) {
         const double theta_r_deg = units_deg_of_udeg(m->directions_udeg[k]);
-        const bool limits = beyond(m->theta_i, theta_i_deg) || beyond(m->theta_r, theta_r_deg);
+        enum plan_skip_reason reason;
         const bool dense = in_dense_zone(c, theta_i_deg, theta_r_deg);
-        if (limits || in_shadow(c, theta_i_deg, theta_r_deg))
-            rc = add_skip(m,
-                          &(struct plan_skip){sweep, theta_i_deg, theta_r_deg,
-                                              limits ? PLAN_SKIP_LIMITS : PLAN_SKIP_BLIND},
-                          err);
+        if (!takes(m, theta_i_deg, theta_r_deg, &reason))
+            rc = add_skip(m, &(struct plan_skip){sweep, theta_i_deg, theta_r_deg, reason}, err);
         else
             rc = add_point(m,
                            &(struct plan_point){.sweep = sweep,
@@ -192,7 +207,8 @@ static int add_reference(struct maker *m, int sweep, int point, enum plan_kind k
         p.theta_i_deg = s->theta_i_deg;
         p.theta_r_deg = s->theta_r_deg;
     }
-    return add_point(m, &p, err);
+    int rc = plan_bench_go_station(&m->at, p.station, err);
+    return rc < 0 ? rc : add_point(m, &p, err);
 }
 
 static int add_all(struct maker *m, struct gon_error *err)
@@ -214,9 +230,7 @@ static void warn_of_directions(struct maker *m)
 {
     const struct campaign_config *c = m->config;
     const struct plan *p = &m->plan;
-    int limits = 0, grazing = 0;
-    for (int i = 0; i < p->skips_count; i++)
-        limits += p->skips[i].reason == PLAN_SKIP_LIMITS;
+    int grazing = 0;
     for (int i = 0; i < p->count; i++)
         grazing +=
             p->points[i].kind == PLAN_SAMPLE && fabs(p->points[i].theta_r_deg) >= GRAZING_DEG;
@@ -233,8 +247,18 @@ static void warn_of_directions(struct maker *m)
                  "theta_i = %.9g deg: the specular direction lies outside theta_r = %.9g..%.9g deg",
                  t, c->from_deg, c->to_deg);
     }
-    if (limits)
-        warn(m, "%d points lie beyond the limits of an axis and are skipped", limits);
+    if (m->skips_for[PLAN_SKIP_LIMITS])
+        warn(m, "%d points lie beyond the limits of an axis and are skipped",
+             m->skips_for[PLAN_SKIP_LIMITS]);
+    for (int i = 0; i < BENCH_KEEP_OUTS; i++)
+        if (m->skips_in[i])
+            warn(m, "%d points lie in keep-out \"%s\" and are skipped", m->skips_in[i],
+                 m->bench->keep_out[i].name);
+    if (m->skips_for[PLAN_SKIP_CUT_OFF])
+        warn(m,
+             "%d points are skipped because a keep-out lies between them and the point before; "
+             "order or limit the sweeps so that each stays on one side",
+             m->skips_for[PLAN_SKIP_CUT_OFF]);
     if (grazing)
         warn(m, "%d points at |theta_r| >= %g deg: 0.1 deg there changes 1/cos theta_r by 2 %%",
              grazing, GRAZING_DEG);
@@ -308,15 +332,6 @@ double plan_spacing_s(double time_constant_s, int slope_db)
     return time_constant_s * solve(correlation, slope_db, CORRELATION);
 }
 
-static double move_s(const struct bench_axis *a, double from, double to)
-{
-    const double d = fabs(to - from);
-    if (!a || d == 0)
-        return 0;
-    return d >= a->speed * a->speed / a->acceleration ? d / a->speed + a->speed / a->acceleration
-                                                      : 2 * sqrt(d / a->acceleration);
-}
-
 static int readings_of(const struct campaign_config *c, enum plan_kind kind)
 {
     return kind == PLAN_DARK   ? c->dark_readings
@@ -324,7 +339,7 @@ static int readings_of(const struct campaign_config *c, enum plan_kind kind)
                                : c->readings;
 }
 
-// Axes move together; the sample goes in and out once each way. Changes of range are not in it.
+// Changes of range are not in it.
 static double duration_s(const struct maker *m)
 {
     const struct bench_config *b = m->bench;
@@ -332,15 +347,10 @@ static double duration_s(const struct maker *m)
         return (double)NAN;
     const double settle = plan_settle_s(b->detector.time_constant_s, b->detector.slope_db);
     const double spacing = plan_spacing_s(b->detector.time_constant_s, b->detector.slope_db);
-    const struct bench_station *beam = bench_find_station(b, "beam");
-    double total = b->laser.warmup_s;
-    total += 2 * move_s(bench_find_axis(b, "sample"), beam ? beam->sample_mm : 0, 0);
-    for (int i = 0; i < m->plan.count; i++) {
-        const struct plan_point *p = &m->plan.points[i], *before = i ? p - 1 : p;
-        total += fmax(move_s(m->theta_i, before->theta_i_deg, p->theta_i_deg),
-                      move_s(m->theta_r, before->theta_r_deg, p->theta_r_deg));
-        total += OVERHEAD_S + settle + spacing * (readings_of(m->config, p->kind) - 1);
-    }
+    double total = b->laser.warmup_s + m->at.moves_s;
+    for (int i = 0; i < m->plan.count; i++)
+        total +=
+            OVERHEAD_S + settle + spacing * (readings_of(m->config, m->plan.points[i].kind) - 1);
     return total;
 }
 
@@ -350,16 +360,14 @@ int plan_make(const struct campaign_config *config, const struct bench_config *b
               struct plan *ret_plan, struct gon_error *err)
 {
     struct maker m = {.config = config, .bench = bench};
-    if (bench) {
-        m.theta_i = bench_find_axis(bench, "theta_i");
-        m.theta_r = bench_find_axis(bench, "theta_r");
-    }
+    int rc = plan_bench_init(&m.at, bench, err);
+    if (rc < 0)
+        return rc;
     m.plan.sweeps = config->theta_i_count;
     m.plan.warnings = calloc(MOST_WARNINGS, sizeof *m.plan.warnings);
     m.directions_udeg = calloc(MOST_DIRECTIONS, sizeof *m.directions_udeg);
-    int rc = m.plan.warnings && m.directions_udeg
-                 ? add_all(&m, err)
-                 : gon_fail(err, GON_E_SYSTEM, "plan: out of memory");
+    rc = m.plan.warnings && m.directions_udeg ? add_all(&m, err)
+                                              : gon_fail(err, GON_E_SYSTEM, "plan: out of memory");
     free(m.directions_udeg);
     if (rc >= 0 && m.plan.samples == 0)
         rc = gon_fail(err, GON_E_INPUT, "nothing is left to measure: all %d points are skipped",

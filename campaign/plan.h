@@ -15,7 +15,13 @@
 #include <stdbool.h>
 
 enum plan_kind { PLAN_SAMPLE, PLAN_BEAM, PLAN_DARK };
-enum plan_skip_reason { PLAN_SKIP_BLIND, PLAN_SKIP_LIMITS };
+enum plan_skip_reason {
+    PLAN_SKIP_BLIND,
+    PLAN_SKIP_LIMITS,   // of an axis, in sweeps
+    PLAN_SKIP_KEEP_OUT, // lies in one
+    PLAN_SKIP_CUT_OFF,  // a keep-out is in the way from the point before
+    PLAN_SKIP_REASONS
+};
 enum { PLAN_MOST_POINTS = 1000000 };
 
 struct plan_point {
@@ -48,13 +54,14 @@ struct plan {
     double duration_s; // estimate; NAN without a bench
 };
 
-// bench may be NULL. GON_E_INPUT: more than PLAN_MOST_POINTS, or nothing is left to measure.
+// bench may be NULL. GON_E_INPUT: more than PLAN_MOST_POINTS, nothing is left to measure, or no way
+// to the beam's station.
 int plan_make(const struct campaign_config *config, const struct bench_config *bench,
               struct plan *ret_plan, struct gon_error *err);
 void plan_clear(struct plan *p); // frees what it holds, not p; NULL is fine
 
 const char *plan_kind_name(enum plan_kind k); // "sample", "beam", "dark"
-// "in the detector's shadow", "beyond an axis's limits"
+// "in the detector's shadow", "beyond an axis's limits", ...
 const char *plan_skip_text(enum plan_skip_reason r);
 
 // What a reading costs the detector (daemon/acquire.h says why): until the step response of n equal

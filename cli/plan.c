@@ -27,7 +27,7 @@ static const struct option_row rows[] = {
 struct sweep {
     double theta_i_deg;
     int points, dense, skipped;
-    int skipped_for[PLAN_SKIP_LIMITS + 1]; // by enum plan_skip_reason
+    int skipped_for[PLAN_SKIP_REASONS]; // by enum plan_skip_reason
 };
 
 static void duration_text(double s, char *text, size_t size)
@@ -64,7 +64,7 @@ static struct sweep sweep_of(const struct plan *p, const struct campaign_config 
 static void why_text(const struct sweep *s, char *text, size_t size)
 {
     *text = 0;
-    for (int reason = PLAN_SKIP_BLIND; reason <= PLAN_SKIP_LIMITS; reason++) {
+    for (int reason = 0; reason < PLAN_SKIP_REASONS; reason++) {
         size_t used = strlen(text);
         if (s->skipped_for[reason])
             snprintf(text + used, size - used, "%s%d %s", used ? ", " : "", s->skipped_for[reason],
@@ -92,7 +92,7 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
             table_right(t, i);
     }
     for (int i = 1; i <= p->sweeps; i++) {
-        char why[120];
+        char why[200];
         struct sweep s = sweep_of(p, c, i);
         why_text(&s, why, sizeof why);
         table_cell(t, "%d", i);
@@ -191,11 +191,13 @@ static int run_plan(const struct verb *verb, int argc, char **argv)
     return EXIT_OK;
 }
 
-const struct verb verb_plan = {"plan",
-                               "CAMPAIGN.cfg",
-                               "the dry run: points, order, time, warnings; moves nothing",
-                               "Prints every sweep with its points, what is skipped and why, "
-                               "warnings, and with --bench the time it\n"
-                               "takes and the points beyond the axes' limits.\n",
-                               rows,
-                               run_plan};
+const struct verb verb_plan = {
+    "plan",
+    "CAMPAIGN.cfg",
+    "the dry run: points, order, time, warnings; moves nothing",
+    "Prints every sweep with its points, what is skipped and why, "
+    "warnings, and with --bench the time it\n"
+    "takes and the points that it cannot reach: beyond the axes' limits, or in or behind a\n"
+    "keep-out.\n",
+    rows,
+    run_plan};

@@ -148,6 +148,98 @@ static void skipped_points_say_why(void **state)
     assert_non_null(strstr(err.text, "nothing is left to measure"));
 }
 
+static const struct plan_skip *skip_at(const struct plan *p, double theta_i_deg, double theta_r_deg)
+{
+    for (int i = 0; i < p->skips_count; i++)
+        if (p->skips[i].theta_i_deg == theta_i_deg && p->skips[i].theta_r_deg == theta_r_deg)
+            return &p->skips[i];
+    return NULL;
+}
+
+static void fence(struct bench_config *b, const char *name, const double vertex[4][2])
+{
+    struct bench_keep_out *k = &b->keep_out[b->keep_out_count++];
+    *k = (struct bench_keep_out){.vertices = 4};
+    snprintf(k->name, sizeof k->name, "%s", name);
+    memcpy(k->vertex, vertex, sizeof k->vertex[0] * 4);
+}
+
+// The detector comes from the beam at theta_r = 180. Below theta_i = 20 there is a way round the
+// head; where there is none, what lies behind it is cut off.
+static void keep_outs_take_points_and_what_lies_behind(void **state)
+{
+    (void)state;
+    static const char text[] = "campaign: { name = \"a\"; theta_i_deg = (10, 40);"
+                               " theta_r: { from_deg = -60; to_deg = 60; step_deg = 10; };"
+                               " dense: { half_width_deg = 0; }; };";
+    static const double head[4][2] = {{20, -15}, {20, -25}, {85, -90}, {85, -80}};
+    struct bench_config b = fixture_bench();
+    struct plan p = planned(text, &b);
+    const double free_s = p.duration_s;
+    plan_clear(&p);
+    fence(&b, "laser head", head);
+    p = planned(text, &b);
+    assert_int_equal(p.samples, 13 + 12);
+    assert_int_equal(skip_at(&p, 40, -40)->reason, PLAN_SKIP_KEEP_OUT);
+    assert_true(p.duration_s > free_s + 20); // to the beam and back
+    assert_true(warns(&p, "1 points lie in keep-out \"laser head\" and are skipped"));
+    plan_clear(&p);
+    b.keep_out[0].vertex[0][0] = b.keep_out[0].vertex[1][0] = -10;
+    b.keep_out[0].vertex[0][1] = 15;
+    b.keep_out[0].vertex[1][1] = 5;
+    p = planned(text, &b);
+    assert_int_equal(p.samples, 7 + 10);
+    assert_int_equal(skip_at(&p, 10, -60)->reason, PLAN_SKIP_CUT_OFF);
+    assert_int_equal(skip_at(&p, 10, -10)->reason, PLAN_SKIP_KEEP_OUT);
+    assert_int_equal(skip_at(&p, 40, -50)->reason, PLAN_SKIP_CUT_OFF);
+    assert_string_equal(plan_skip_text(PLAN_SKIP_CUT_OFF), "cut off by a keep-out");
+    assert_true(warns(&p, "7 points are skipped because a keep-out lies between"));
+    plan_clear(&p);
+}
+
+static void no_way_to_the_beam_refuses_the_campaign(void **state)
+{
+    (void)state;
+    static const double wall[4][2] = {{-10, 100}, {90, 100}, {90, 110}, {-10, 110}};
+    struct bench_config b = fixture_bench();
+    struct plan p;
+    struct gon_error err;
+    fence(&b, "wall", wall);
+    const struct campaign_config c =
+        fixture_campaign("campaign: { name = \"a\"; theta_i_deg = 10; };");
+    assert_int_equal(plan_make(&c, &b, &p, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "nothing is left to measure"));
+}
+
+// theta_i = tilt - 3 and theta_r = arm - tilt; the arm sweeps to 60 deg and may stand at 183 deg.
+static void limits_are_those_of_the_axes(void **state)
+{
+    (void)state;
+    struct bench_config b = fixture_bench();
+    snprintf(b.axes[0].name, BENCH_NAME, "tilt");
+    snprintf(b.axes[1].name, BENCH_NAME, "arm");
+    b.axes[1].max = 190;
+    b.axes[1].sweep_count = 2;
+    b.axes[1].sweep[0] = -30;
+    b.axes[1].sweep[1] = 60;
+    b.kinematics.rows_count = 2;
+    b.kinematics.rows[0] = (struct bench_row){.axis = "tilt", .theta_i = 1, .offset = 3};
+    b.kinematics.rows[1] =
+        (struct bench_row){.axis = "arm", .theta_i = 1, .theta_r = 1, .offset = 3};
+    struct plan p = planned("campaign: { name = \"a\"; theta_i_deg = (0, 30);"
+                            " theta_r: { from_deg = -40; to_deg = 60; step_deg = 10; };"
+                            " dense: { half_width_deg = 0; }; };",
+                            &b);
+    // 0: arm = 3 + theta_r within -30..60: theta_r -30..50; 30: arm = 33 + theta_r: -40..20
+    assert_int_equal(p.samples, 9 + 7);
+    assert_null(skip_at(&p, 0, -30));
+    assert_int_equal(skip_at(&p, 0, -40)->reason, PLAN_SKIP_LIMITS);
+    assert_int_equal(skip_at(&p, 0, 60)->reason, PLAN_SKIP_LIMITS);
+    assert_int_equal(skip_at(&p, 30, 30)->reason, PLAN_SKIP_LIMITS);
+    assert_null(skip_at(&p, 30, -40));
+    plan_clear(&p);
+}
+
 static void warnings_name_what_spoils_the_fit(void **state)
 {
     (void)state;
@@ -218,6 +310,9 @@ int main(void)
         cmocka_unit_test(references_stand_around_the_sweeps),
         cmocka_unit_test(directions_are_merged_in_micro_degrees),
         cmocka_unit_test(skipped_points_say_why),
+        cmocka_unit_test(keep_outs_take_points_and_what_lies_behind),
+        cmocka_unit_test(no_way_to_the_beam_refuses_the_campaign),
+        cmocka_unit_test(limits_are_those_of_the_axes),
         cmocka_unit_test(warnings_name_what_spoils_the_fit),
         cmocka_unit_test(filters_settle_as_tabulated),
         cmocka_unit_test(duration_adds_moves_and_readings),
