@@ -150,8 +150,9 @@ static void publish_reading(struct engine *e, const struct acquire_reading *r,
                             const struct travel_pose *at)
 {
     struct engine_event event = event_of(e, ENGINE_READING, NULL);
-    event.theta_i_deg = at->at[PART_THETA_I];
-    event.theta_r_deg = at->at[PART_THETA_R];
+    const struct kinematics_pose pose = kinematics_forward(instrument_kinematics(e->in), at->at);
+    event.theta_i_deg = pose.theta_i;
+    event.theta_r_deg = pose.theta_r;
     event.flags = r->flags;
     if (e->point->kind == PLAN_SAMPLE)
         provisional(e, r, event.theta_i_deg, event.theta_r_deg, &event.f_per_sr, &event.u_per_sr);
@@ -185,13 +186,14 @@ static void begin_pace(struct engine *e)
 static struct store_reading row_of(const struct engine *e, const struct acquire_reading *r,
                                    const struct travel_pose *at)
 {
+    const struct kinematics_pose pose = kinematics_forward(instrument_kinematics(e->in), at->at);
     return (struct store_reading){
         .sweep = e->point->sweep,
         .point = e->point->point,
         .attempt = e->attempt,
         .t_utc_ms = r->utc_ns / 1000000,
-        .theta_i_udeg = (int32_t)units_udeg(at->at[PART_THETA_I]),
-        .theta_r_udeg = (int32_t)units_udeg(at->at[PART_THETA_R]),
+        .theta_i_udeg = (int32_t)units_udeg(pose.theta_i),
+        .theta_r_udeg = (int32_t)units_udeg(pose.theta_r),
         .signal_v = r->signal_v,
         .signal_sd_v = r->signal_sd_v,
         .monitor_v = r->monitor_v,
@@ -225,11 +227,11 @@ static int prepare(struct engine *e)
 static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;
-    struct travel_pose pose = {.at = {p->theta_i_deg, p->theta_r_deg, 0.0}};
+    struct travel_pose pose = travel_stay();
     int rc = 0;
-    if (p->kind == PLAN_DARK && !p->station[0])
-        pose = (struct travel_pose){.at = {(double)NAN, (double)NAN, (double)NAN}};
-    else if (p->kind != PLAN_SAMPLE)
+    if (p->kind == PLAN_SAMPLE)
+        rc = travel_to_sample(e->in, p->theta_i_deg, p->theta_r_deg, &pose, &e->why);
+    else if (p->kind != PLAN_DARK || p->station[0])
         rc = travel_station(e->in, p->station, &pose, &e->why);
     return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
 }

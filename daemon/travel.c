@@ -2,37 +2,29 @@
 #include "daemon/travel.h"
 
 #include "campaign/bench.h"
+#include "campaign/keepout.h"
 
 #include <math.h>
 #include <string.h>
 
-#define RESEEKS_MOST 2
-#define LOOK_NS CLK_MS(250) // while waiting for the predicted arrival: for alarms
-#define HALT_NS CLK_S(2)    // a stop that takes longer is a fault
+#define STALL_NS CLK_S(1)    // a position that should change and does not
+#define SLACK_NS CLK_MS(200) // of a profile: the controller may begin so much later
+#define LOOK_NS CLK_MS(250)  // while waiting for the predicted arrival: for alarms
+#define HALT_NS CLK_S(2)     // a stop that takes longer is a fault
 #define HOME_LEAST_S 120.0
 
-// One axis on its way: below the target first when there is backlash to take up, then to the
+// One axis on its way: beyond the target first when there is backlash to take up, then to the
 // target.
 struct leg {
     enum instrument_part part;
-    double target, to;
+    double target, from, to;
+    double low, high; // what it may pass until it is done
     bool last_leg, done;
     int reseeks;
-    int64_t arrival_ns, look_ns, deadline_ns, step_ns;
+    int64_t start_ns, arrival_ns, look_ns, deadline_ns, step_ns;
+    double stood_at; // where it was seen to advance last, and when
+    int64_t stood_ns;
 };
-
-double travel_time_s(double distance, double speed, double acceleration)
-{
-    distance = fabs(distance);
-    if (distance * acceleration < speed * speed)
-        return 2.0 * sqrt(distance / acceleration);
-    return distance / speed + speed / acceleration;
-}
-
-static double tolerance(const struct bench_axis *axis)
-{
-    return fmax(axis->deadband, 0.5 / fabs(axis->steps_per_unit)) + 1e-9;
-}
 
 static const char *axis_name(const struct instrument *in, enum instrument_part part)
 {
@@ -62,8 +54,10 @@ static int start_leg(struct instrument *in, struct leg *t, double from, struct g
     if (rc < 0 && rc != GON_E_LINK)
         return rc;
 
-    const double s = travel_time_s(t->to - from, axis->speed, axis->acceleration);
+    const double s = bench_axis_move_s(axis, from, t->to);
     const int64_t now_ns = instrument_now_ns(in);
+    t->from = t->stood_at = from;
+    t->start_ns = t->stood_ns = now_ns;
     t->arrival_ns = now_ns + CLK_S(s);
     t->deadline_ns = now_ns + CLK_S(2.0 * s + 2.0);
     t->step_ns = CLK_MS(fmin(fmax(100.0 * s, 1.0), 50.0));
@@ -89,14 +83,19 @@ static int halt_and_wait(struct instrument *in, enum instrument_part part,
     return rc;
 }
 
-// From below straight to the target; from above, or with the play not taken up, first below it.
+// From the approach's side straight to the target; from the other, or with the play not taken up,
+// first beyond it.
 static void choose_leg(struct instrument *in, struct leg *t, double from)
 {
     const struct bench_axis *axis = instrument_axis(in, t->part);
-    const double below = fmax(t->target - axis->backlash - tolerance(axis), axis->min);
-    const bool upward = from <= t->target && (instrument_engaged(in, t->part) || from <= below);
-    t->last_leg = axis->backlash <= 0 || upward;
-    t->to = t->last_leg ? t->target : instrument_rounded(in, t->part, below);
+    const double sign = axis->approach == BENCH_FROM_ABOVE ? -1 : 1;
+    const double off = axis->backlash + bench_axis_tolerance(axis);
+    const double beyond = fmin(fmax(t->target - sign * off, axis->min), axis->max);
+    const bool direct = sign * (t->target - from) >= 0 &&
+                        (instrument_engaged(in, t->part) || sign * (beyond - from) >= 0);
+    t->last_leg = axis->backlash <= 0 || direct;
+    t->to = t->last_leg ? t->target : instrument_rounded(in, t->part, beyond);
+    bench_axis_span(axis, from, t->target, &t->low, &t->high);
 }
 
 // Where it is, which way round it goes, and off.
@@ -115,8 +114,9 @@ static int set_out(struct instrument *in, struct leg *t, const struct cancel *ca
 
     const double half_step = 0.5 / fabs(axis->steps_per_unit);
     t->target = instrument_rounded(in, t->part, t->target);
-    if (fabs(p.position - t->target) <= tolerance(axis) && fabs(p.target - t->target) < half_step &&
-        instrument_engaged(in, t->part)) {
+    t->low = t->high = p.position;
+    if (fabs(p.position - t->target) <= bench_axis_tolerance(axis) &&
+        fabs(p.target - t->target) < half_step && instrument_engaged(in, t->part)) {
         t->done = true;
         return 0;
     }
@@ -124,7 +124,56 @@ static int set_out(struct instrument *in, struct leg *t, const struct cancel *ca
     return start_leg(in, t, p.position, err);
 }
 
-static int look(struct instrument *in, struct leg *t, struct gon_error *err)
+// Whether what moves is where its profile may have brought it by now.
+static int check_way(struct instrument *in, struct leg *t, const struct axis_place *p,
+                     struct gon_error *err)
+{
+    const struct bench_axis *axis = instrument_axis(in, t->part);
+    const int64_t now_ns = instrument_now_ns(in);
+    const double after_s = (double)(now_ns - t->start_ns) * 1e-9;
+    const double now = bench_axis_on_way(axis, t->from, t->to, after_s);
+    const double late = bench_axis_on_way(axis, t->from, t->to, after_s - (double)SLACK_NS * 1e-9);
+    const double off = fmax(fmin(now, late) - p->position, p->position - fmax(now, late));
+    if (axis->following_error > 0 && off > axis->following_error)
+        return gon_fail(err, GON_E_DEVICE,
+                        "axis %s: at %.4f %s it is %.4f off its way (following_error %.4g): too "
+                        "fast, too heavy or slipping; look at it, then: gonio resume",
+                        axis->name, p->position, axis->unit_name, off, axis->following_error);
+    const double then =
+        bench_axis_on_way(axis, t->from, t->to, (double)(t->stood_ns - t->start_ns) * 1e-9);
+    const double tolerance = bench_axis_tolerance(axis);
+    if (fabs(p->position - t->stood_at) > tolerance || fabs(now - then) <= 2 * tolerance) {
+        t->stood_at = p->position;
+        t->stood_ns = now_ns;
+    }
+    if (now_ns - t->stood_ns > STALL_NS)
+        return gon_fail(err, GON_E_DEVICE,
+                        "axis %s: says that it moves but has stood at %.4f %s for %.1f s: blocked, "
+                        "or its encoder is dead; look at it, then: gonio resume",
+                        axis->name, p->position, axis->unit_name,
+                        (double)(now_ns - t->stood_ns) * 1e-9);
+    return 0;
+}
+
+// Before it is sought again from where it should not stand: whether a keep-out is in reach of that
+// and of what the other axes are doing.
+static int check_again(struct instrument *in, const struct leg *legs, struct gon_error *err)
+{
+    const struct bench_config *bench = instrument_bench(in);
+    double low[BENCH_AXES], high[BENCH_AXES];
+    for (int i = 0; i < INSTRUMENT_AXES; i++) {
+        low[i] = legs[i].low;
+        high[i] = legs[i].high;
+    }
+    const int hit = keepout_within(bench, instrument_kinematics(in), low, high);
+    return hit < 0 ? 0
+                   : gon_fail(err, GON_E_DEVICE,
+                              "an axis missed its place and may not be sought again so near to "
+                              "keep-out \"%s\"; move it away, then: gonio resume",
+                              bench->keep_out[hit].name);
+}
+
+static int look(struct instrument *in, struct leg *legs, struct leg *t, struct gon_error *err)
 {
     const struct bench_axis *axis = instrument_axis(in, t->part);
     struct axis_place p;
@@ -135,7 +184,7 @@ static int look(struct instrument *in, struct leg *t, struct gon_error *err)
         return rc;
 
     const int64_t now_ns = instrument_now_ns(in);
-    const bool there = fabs(p.position - t->to) <= tolerance(axis);
+    const bool there = fabs(p.position - t->to) <= bench_axis_tolerance(axis);
     const bool still = !p.moving && p.ready && (p.in_position || !there);
     if (!still || (!there && now_ns < t->arrival_ns)) {
         if (now_ns > t->deadline_ns)
@@ -143,12 +192,15 @@ static int look(struct instrument *in, struct leg *t, struct gon_error *err)
                             "axis %s: still not at %.4f %s, twice the time it should take and 2 s "
                             "after its start (now %.4f); look at it, then: gonio resume",
                             axis->name, t->to, axis->unit_name, p.position);
+        if (p.moving && !there && (rc = check_way(in, t, &p, err)) < 0)
+            return rc;
         int64_t next_ns = now_ns < t->arrival_ns ? t->arrival_ns : now_ns + t->step_ns;
         t->look_ns = next_ns < now_ns + LOOK_NS ? next_ns : now_ns + LOOK_NS;
         return 0;
     }
     if (there && t->last_leg) {
         t->done = true;
+        t->low = t->high = p.position;
         return 0;
     }
     if (there) {
@@ -157,14 +209,15 @@ static int look(struct instrument *in, struct leg *t, struct gon_error *err)
         return start_leg(in, t, p.position, err);
     }
     // It stands somewhere else: the command was lost, or it missed. Standing, it may be told again.
-    if (t->reseeks++ >= RESEEKS_MOST)
+    if (t->reseeks++ >= axis->retries)
         return gon_fail(
             err, GON_E_DEVICE,
             "axis %s: stands at %.4f %s instead of %.4f (deadband %.4f) after %d tries; "
             "look for a slipping or blocked axis, then: gonio resume",
-            axis->name, p.position, axis->unit_name, t->to, axis->deadband, 1 + RESEEKS_MOST);
+            axis->name, p.position, axis->unit_name, t->to, axis->deadband, 1 + axis->retries);
     choose_leg(in, t, p.position);
-    return start_leg(in, t, p.position, err);
+    rc = check_again(in, legs, err);
+    return rc < 0 ? rc : start_leg(in, t, p.position, err);
 }
 
 static int ride_all(struct instrument *in, struct leg *t, const struct cancel *cancel,
@@ -182,7 +235,7 @@ static int ride_all(struct instrument *in, struct leg *t, const struct cancel *c
         for (int i = 0; i < INSTRUMENT_AXES; i++) {
             if (t[i].done || t[i].look_ns > instrument_now_ns(in))
                 continue;
-            int rc = look(in, &t[i], err);
+            int rc = look(in, t, &t[i], err);
             if (rc < 0)
                 return rc;
         }
@@ -204,7 +257,7 @@ static int where(struct instrument *in, const struct travel_pose *target,
                 return rc;
             const struct bench_axis *axis = instrument_axis(in, part);
             if (!isnan(target->at[part]) &&
-                fabs(p.position - target->at[part]) > 2.0 * tolerance(axis))
+                fabs(p.position - target->at[part]) > 2.0 * bench_axis_tolerance(axis))
                 return gon_fail(err, GON_E_DEVICE,
                                 "axis %s: moved by itself from %.4f to %.4f %s; look at it, then: "
                                 "gonio resume",
@@ -216,33 +269,115 @@ static int where(struct instrument *in, const struct travel_pose *target,
     return 0;
 }
 
+// Where all axes stand that the angles depend on, so that a way can be found from there.
+static int stand_still(struct instrument *in, const struct cancel *cancel,
+                       double ret_at[INSTRUMENT_AXES], struct gon_error *err)
+{
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
+        struct axis_place p;
+        ret_at[part] = (double)NAN;
+        if (!instrument_has(in, part) || !kinematics_steers(instrument_kinematics(in), (int)part))
+            continue;
+        int rc = instrument_place_recent(in, part, &p, err);
+        if (rc >= 0)
+            rc = check(in, part, &p, err);
+        if (rc >= 0 && p.moving)
+            rc = halt_and_wait(in, part, cancel, &p, err);
+        if (rc < 0)
+            return rc;
+        ret_at[part] = p.position;
+    }
+    return 0;
+}
+
+static int find_way(struct instrument *in, const struct travel_pose *target,
+                    const struct cancel *cancel, double at[INSTRUMENT_AXES],
+                    struct keepout_way *ret_way, struct gon_error *err)
+{
+    struct gon_error why;
+    const struct bench_config *bench = instrument_bench(in);
+    int rc = bench->keep_out_count ? stand_still(in, cancel, at, err) : 0;
+    if (rc < 0)
+        return rc;
+    rc = keepout_find_way(bench, instrument_kinematics(in), at, target->at, ret_way, &why);
+    return rc < 0 ? gon_fail(err, GON_E_DEVICE, "%s, then: gonio resume", why.text) : 0;
+}
+
+static int ride_stage(struct instrument *in, const struct keepout_stage *stage,
+                      const double at[INSTRUMENT_AXES], const struct cancel *cancel,
+                      struct gon_error *err)
+{
+    struct leg t[INSTRUMENT_AXES];
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
+        const bool asked =
+            stage->axes >> part & 1 && instrument_has(in, part) && !isnan(stage->to[part]);
+        t[part] = (struct leg){.part = part,
+                               .target = stage->to[part],
+                               .low = at[part],
+                               .high = at[part],
+                               .done = !asked};
+    }
+    int rc = 0;
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES && rc >= 0; part++)
+        if (!t[part].done)
+            rc = set_out(in, &t[part], cancel, err);
+    return rc < 0 ? rc : ride_all(in, t, cancel, err);
+}
+
 int travel_move(struct instrument *in, const struct travel_pose *target,
                 const struct cancel *cancel, struct travel_pose *ret_actual, struct gon_error *err)
 {
-    struct leg t[INSTRUMENT_AXES];
-    int rc = cancel_requested(cancel) ? gon_fail(err, GON_E_CANCELED, "stopped before moving") : 0;
-    for (enum instrument_part part = 0; part < INSTRUMENT_AXES && rc >= 0; part++) {
-        const bool asked = instrument_has(in, part) && !isnan(target->at[part]);
-        t[part] = (struct leg){.part = part, .target = target->at[part], .done = !asked};
-        if (asked)
-            rc = set_out(in, &t[part], cancel, err);
+    double at[INSTRUMENT_AXES] = {0};
+    struct keepout_way way;
+    if (cancel_requested(cancel))
+        return gon_fail(err, GON_E_CANCELED, "stopped before moving");
+    int rc = find_way(in, target, cancel, at, &way, err);
+    for (int n = 0; rc >= 0 && n < way.stages; n++) {
+        const struct keepout_stage *stage = &way.stage[n];
+        rc = ride_stage(in, stage, at, cancel, err);
+        for (int i = 0; i < INSTRUMENT_AXES; i++)
+            if (stage->axes >> i & 1 && !isnan(stage->to[i]))
+                at[i] = stage->to[i];
     }
-    if (rc >= 0)
-        rc = ride_all(in, t, cancel, err);
-    if (rc >= 0)
-        rc = where(in, target, ret_actual, err);
-    return rc;
+    return rc < 0 ? rc : where(in, target, ret_actual, err);
+}
+
+struct travel_pose travel_stay(void)
+{
+    struct travel_pose pose = {.still_ns = 0};
+    for (int i = 0; i < INSTRUMENT_AXES; i++)
+        pose.at[i] = (double)NAN;
+    return pose;
+}
+
+int travel_to_sample(const struct instrument *in, double theta_i_deg, double theta_r_deg,
+                     struct travel_pose *ret_pose, struct gon_error *err)
+{
+    const struct kinematics_pose geometry = {theta_i_deg, theta_r_deg, 0, (double)NAN, (double)NAN};
+    const int sample = bench_axis_index(instrument_bench(in), "sample");
+    struct travel_pose pose = travel_stay();
+    int rc = kinematics_inverse(instrument_kinematics(in), &geometry, pose.at, err);
+    if (rc < 0)
+        return rc;
+    if (sample >= 0)
+        pose.at[sample] = 0.0;
+    *ret_pose = pose;
+    return 0;
 }
 
 int travel_station(const struct instrument *in, const char *name, struct travel_pose *ret_pose,
                    struct gon_error *err)
 {
-    const struct bench_station *s = bench_find_station(instrument_bench(in), name);
+    const struct bench_config *bench = instrument_bench(in);
+    const struct bench_station *s = bench_find_station(bench, name);
+    struct travel_pose pose = travel_stay();
     if (!s)
         return gon_fail(err, GON_E_INPUT, "the bench has no station \"%s\": add it to stations",
                         name);
-    *ret_pose = (struct travel_pose){.at = {s->theta_i_deg, s->theta_r_deg, s->sample_mm}};
-    return 0;
+    int rc = bench_station_at(bench, instrument_kinematics(in), s, pose.at, err);
+    if (rc >= 0)
+        *ret_pose = pose;
+    return rc;
 }
 
 static int home_one(struct instrument *in, enum instrument_part part, const struct cancel *cancel,

@@ -15,6 +15,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+// simconfig's axes are the world's, in its order.
+#define PART_THETA_I ((enum instrument_part)WORLD_THETA_I)
+#define PART_THETA_R ((enum instrument_part)WORLD_THETA_R)
+#define PART_SAMPLE ((enum instrument_part)WORLD_SAMPLE)
+
 enum simbench_device { SIMBENCH_AXES, SIMBENCH_LASER, SIMBENCH_DETECTOR, SIMBENCH_DEVICES };
 
 struct simbench;
@@ -36,7 +41,7 @@ struct simbench_axis {
 struct simbench {
     struct clk_virtual clk;
     struct world world;
-    struct simbench_axis axis[INSTRUMENT_AXES];
+    struct simbench_axis axis[WORLD_AXES];
     struct laser laser;
     struct detector detector;
     int range;
@@ -441,7 +446,7 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
     if (tune)
         tune(&spec);
     world_init(&b->world, &spec, b->clk.t_ns);
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < WORLD_AXES; i++)
         b->axis[i] = (struct simbench_axis){
             .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
 }
@@ -449,7 +454,7 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
 static inline struct instrument_parts simbench_parts(struct simbench *b)
 {
     struct instrument_parts parts = {.laser = &b->laser, .detector = &b->detector};
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < WORLD_AXES; i++)
         parts.axis[i] = &b->axis[i].axis;
     return parts;
 }

@@ -297,7 +297,7 @@ static inline enum run_state go(struct run *r)
         print_error("failed: %s\n", err.text);
     if (emits(r) && laser_reachable(r))
         violate(r, "laser on after the end");
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < WORLD_AXES; i++)
         if (motion_at(&r->b.world.axis[i], r->b.clk.t_ns + CLK_S(1)).moving)
             violate(r, "an axis moves after the end");
     return s;

@@ -90,6 +90,24 @@ static void a_station_leads_round(void **state)
     assert_true(w.stage[2].to[THETA_I] == 60 && w.stage[2].to[THETA_R] == 0);
 }
 
+// Between the head and the end of theta_i's travel theta_r can only go back where it came from.
+static void a_corner_is_left_as_it_was_entered(void **state)
+{
+    (void)state;
+    static const double hook[][2] = {{40, -40}, {88, -40}, {88, -45},
+                                     {50, -45}, {50, -70}, {40, -70}};
+    struct kinematics k;
+    struct keepout_way w;
+    struct bench_config b;
+    simconfig_bench(&b);
+    b.stations_count = 0;
+    fence(&b, "hook", hook, 6);
+    assert_int_equal(bench_kinematics(&b, &k, NULL), 0);
+    assert_int_equal(way(&b, &k, 80, -60, 10, 30, &w, NULL), 0);
+    assert_true(w.stage[0].to[THETA_R] == -180 && w.stage[0].to[THETA_I] == 80);
+    assert_int_equal(w.stages, 3);
+}
+
 static void no_way_is_said_with_its_reason(void **state)
 {
     (void)state;
@@ -98,6 +116,7 @@ static void no_way_is_said_with_its_reason(void **state)
     struct gon_error err;
     struct bench_config b = bench_with_head(&k);
     b.stations_count = 0;
+    b.axes[THETA_I].min = 25; // no way round the head's end
     assert_int_equal(way(&b, &k, 60, -80, 60, 0, &w, &err), GON_E_INPUT);
     assert_string_equal(err.text,
                         "no way from theta_i 60.000, theta_r -80.000 to 60.000, 0.000 deg round "
@@ -113,7 +132,7 @@ static void no_way_is_said_with_its_reason(void **state)
 static void the_way_round_for_the_approach_counts(void **state)
 {
     (void)state;
-    static const double below[][2] = {{0, 8}, {90, 8}, {90, 9.8}, {0, 9.8}};
+    static const double below[][2] = {{-10, 8}, {90, 8}, {90, 9.8}, {-10, 9.8}};
     struct kinematics k;
     struct keepout_way w;
     struct bench_config b;
@@ -181,6 +200,7 @@ int main(void)
         cmocka_unit_test(all_together_where_that_is_clear),
         cmocka_unit_test(one_after_the_other_where_together_is_not),
         cmocka_unit_test(a_station_leads_round),
+        cmocka_unit_test(a_corner_is_left_as_it_was_entered),
         cmocka_unit_test(no_way_is_said_with_its_reason),
         cmocka_unit_test(the_way_round_for_the_approach_counts),
         cmocka_unit_test(no_place_in_a_box_is_missed),
