@@ -197,8 +197,18 @@ static bool find_straight(const struct move *m, struct keepout_way *way)
     return true;
 }
 
+// By a place: there, and on from there.
+static bool find_by(const struct move *m, const double at[BENCH_AXES], struct keepout_way *way)
+{
+    struct move there = *m, on = *m;
+    there.to = on.from = at;
+    way->stages = 0;
+    return find_straight(&there, way) && find_straight(&on, way);
+}
+
 // Only the axes that steer go to the station: the sample stays in.
-static bool find_round(const struct move *m, const struct bench_station *s, struct keepout_way *way)
+static bool find_by_station(const struct move *m, const struct bench_station *s,
+                            struct keepout_way *way)
 {
     double at[BENCH_AXES];
     if (bench_station_at(m->bench, m->kinematics, s, at, NULL) < 0)
@@ -206,10 +216,21 @@ static bool find_round(const struct move *m, const struct bench_station *s, stru
     for (int i = 0; i < BENCH_AXES; i++)
         if (!(m->steering >> i & 1))
             at[i] = m->from[i];
-    struct move there = *m, on = *m;
-    there.to = on.from = at;
-    way->stages = 0;
-    return find_straight(&there, way) && find_straight(&on, way);
+    return find_by(m, at, way);
+}
+
+// One axis steps aside to an end of its travel, out of a corner that it went into.
+static bool find_aside(const struct move *m, int axis, struct keepout_way *way)
+{
+    const double ends[] = {m->bench->axes[axis].min, m->bench->axes[axis].max};
+    bool found = false;
+    for (int k = 0; k < 2 && m->steering >> axis & 1 && !found; k++) {
+        double at[BENCH_AXES];
+        memcpy(at, m->from, sizeof at);
+        at[axis] = ends[k];
+        found = find_by(m, at, way);
+    }
+    return found;
 }
 
 static int no_way(const struct move *m, struct gon_error *err)
@@ -248,7 +269,9 @@ int keepout_find_way(const struct bench_config *b, const struct kinematics *k,
     else
         found = find_straight(&m, &way);
     for (int i = 0; i < b->stations_count && !found; i++)
-        found = find_round(&m, &b->stations[i], &way);
+        found = find_by_station(&m, &b->stations[i], &way);
+    for (int i = 0; i < b->axes_count && !found; i++)
+        found = find_aside(&m, i, &way);
     if (!found)
         return no_way(&m, err);
     *ret_way = way;

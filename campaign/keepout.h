@@ -7,8 +7,8 @@
 // to take up its play. So a stage of a move is clear only when no combination of the positions that
 // its axes pass touches a keep-out or comes within KEEPOUT_MARGIN_DEG of it. When all axes together
 // are not clear, one after the other may be: then the way is a straight line for each. And where
-// that does not help either, one of the bench's stations may lead round: from there it is tried
-// again.
+// that does not help either, one of the bench's stations may lead round, or one axis that first
+// steps aside to an end of its travel: from there it is tried again.
 #pragma once
 #include "base/err.h"
 #include "campaign/bench.h"
