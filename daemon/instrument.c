@@ -235,11 +235,13 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         const bool there = (int)part < bench->axes_count;
         const double unknown = (double)NAN;
-        in->motor[part] = (struct motor){.config = there ? &bench->axes[part] : NULL,
-                                         .bus = -1,
-                                         .commanded = unknown,
-                                         .seen_ns = INT64_MIN,
-                                         .place = {unknown, unknown, unknown, unknown}};
+        in->motor[part] = (struct motor){
+            .config = there ? &bench->axes[part] : NULL,
+            .bus = -1,
+            .commanded = unknown,
+            .seen_ns = INT64_MIN,
+            .place = {
+                .position = unknown, .target = unknown, .dial = unknown, .raw_steps = unknown}};
         in->part[part].name = there ? bench->axes[part].name : "";
         in->part[part].link = there ? PART_LOST : PART_ABSENT;
     }
