@@ -252,15 +252,16 @@ static int take_strings(const struct place *at, const config_setting_t *s,
     return mistakes;
 }
 
-static int take_choice(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+// ret_index gets the word's index; nothing when it is a mistake.
+static int take_word(const struct place *at, const config_setting_t *s, const struct cfg_row *row,
+                     int *ret_index)
 {
     char list[200] = "";
     const char *text =
         config_setting_type(s) == CONFIG_TYPE_STRING ? config_setting_get_string(s) : NULL;
     for (int i = 0; row->choices[i]; i++) {
         if (text && !strcmp(text, row->choices[i])) {
-            if (at->target)
-                *(int *)member(at, row->offset) = i;
+            *ret_index = i;
             return 0;
         }
         size_t used = strlen(list);
@@ -269,6 +270,37 @@ static int take_choice(const struct place *at, const config_setting_t *s, const 
     const char *meant = text ? options_suggest(text, row->choices) : NULL;
     return wrong(at, s, "%s; allowed %s%s%s%s", text ? "unknown" : "not a text in double quotes",
                  list, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+static int take_choice(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+{
+    int index = 0, mistakes = take_word(at, s, row, &index);
+    if (at->target)
+        *(int *)member(at, row->offset) = index;
+    return mistakes;
+}
+
+static int take_choices(const struct place *at, const config_setting_t *s,
+                        const struct cfg_row *row)
+{
+    const bool list = config_setting_is_array(s) || config_setting_is_list(s);
+    const int count = list ? config_setting_length(s) : 1;
+    int *indices = member(at, row->offset), mistakes = 0;
+    if ((size_t)count > row->size)
+        return wrong(at, s, "%d words; at most %zu are allowed", count, row->size);
+    if (count == 0)
+        return wrong(at, s, "an empty list; give at least one word");
+    for (int i = 0; i < count; i++) {
+        const struct place element = inner(at, NULL, i, NULL);
+        int index = 0;
+        mistakes += take_word(list ? &element : at,
+                              list ? config_setting_get_elem(s, (unsigned)i) : s, row, &index);
+        if (indices)
+            indices[i] = index;
+    }
+    if (at->target)
+        *(int *)member(at, row->count_offset) = count;
+    return mistakes;
 }
 
 // --- one row -------------------------------------------------------------------------------------
@@ -309,6 +341,8 @@ static int take_row(const struct place *at, const config_setting_t *s, const str
         return take_strings(at, s, row);
     case CFG_CHOICE:
         return take_choice(at, s, row);
+    case CFG_CHOICES:
+        return take_choices(at, s, row);
     case CFG_REALS:
         return take_reals(at, s, row);
     case CFG_PAIRS: return take_pairs(at, s, row);
@@ -347,7 +381,7 @@ static void fall_back_word(const struct place *at, const struct cfg_row *row, co
     bool quoted = length >= 2 && text[0] == '"' && text[length - 1] == '"';
     snprintf(word, sizeof word, "%.*s", (int)(quoted ? length - 2 : length),
              quoted ? text + 1 : text);
-    if (row->type != CFG_CHOICE) {
+    if (!row->choices) {
         strncpy(member(at, row->offset), word, row->size);
         return;
     }
@@ -395,6 +429,10 @@ static void fall_back(const struct place *at, const struct cfg_row *row)
         break;
     case CFG_CHOICE:
         fall_back_word(at, row, *text ? text : row->choices[0]);
+        break;
+    case CFG_CHOICES:
+        fall_back_word(at, row, *text ? text : row->choices[0]);
+        *(int *)member(at, row->count_offset) = 1;
         break;
     case CFG_INT:
     case CFG_HEX:
