@@ -4,6 +4,7 @@
 #pragma once
 #include "base/cfg.h"
 #include "base/err.h"
+#include "campaign/bench_states.h"
 #include "campaign/kinematics.h"
 #include "campaign/polarisation.h"
 
@@ -125,6 +126,7 @@ struct bench_config {
     int keep_out_count;
     struct bench_laser laser;
     struct bench_detector detector;
+    struct bench_polarisation polarisation;
     struct bench_station stations[BENCH_STATIONS];
     int stations_count;
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides

@@ -311,5 +311,5 @@ int bench_check(struct cfg_file *f, const struct bench_config *b)
     if (!bench_find_station(b, "beam"))
         mistakes += cfg_complain(
             f, "stations", "station 'beam' is missing: where the detector looks into the beam");
-    return mistakes + marks + outlines + maps + check_links(f, b);
+    return mistakes + marks + outlines + maps + check_links(f, b) + bench_states_check(f, b);
 }

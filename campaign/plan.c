@@ -3,6 +3,7 @@
 
 #include "base/units.h"
 #include "campaign/plan_bench.h"
+#include "campaign/plan_states.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -26,6 +27,8 @@ struct maker {
     int64_t *directions_udeg; // of one sweep
     struct plan_bench at;     // where the bench stands after the last point
     int skips_for[PLAN_SKIP_REASONS], skips_in[BENCH_KEEP_OUTS];
+    struct campaign_channel channels[CAMPAIGN_CHANNELS]; // resolved: of "laser" the bench's
+    int channels_count;
 };
 
 const char *plan_kind_name(enum plan_kind k)
@@ -80,7 +83,8 @@ static int add_point(struct maker *m, const struct plan_point *point, struct gon
     return GON_OK;
 }
 
-static int add_skip(struct maker *m, const struct plan_skip *skip, struct gon_error *err)
+static int add_skip(struct maker *m, const struct plan_skip *skip, int keep_out,
+                    struct gon_error *err)
 {
     struct plan *p = &m->plan;
     struct plan_skip *larger = grow(p->skips, p->skips_count, &m->skips_room, sizeof *larger);
@@ -89,6 +93,8 @@ static int add_skip(struct maker *m, const struct plan_skip *skip, struct gon_er
     p->skips = larger;
     p->skips[p->skips_count++] = *skip;
     m->skips_for[skip->reason]++;
+    if (keep_out >= 0)
+        m->skips_in[keep_out]++;
     return GON_OK;
 }
 
@@ -157,38 +163,55 @@ static bool in_shadow(const struct campaign_config *c, double theta_i_deg, doubl
 // Whether the point is measured; if so, the bench stands there now. The axes' limits come before
 // the shadow.
 static bool takes(struct maker *m, double theta_i_deg, double theta_r_deg,
-                  enum plan_skip_reason *ret_reason)
+                  enum plan_skip_reason *ret_reason, int *ret_keep_out)
 {
     const bool shadow = in_shadow(m->config, theta_i_deg, theta_r_deg);
     const struct plan_bench before = m->at;
-    int keep_out = -1;
-    const bool went = plan_bench_go(&m->at, theta_i_deg, theta_r_deg, ret_reason, &keep_out);
+    const bool went = plan_bench_go(&m->at, theta_i_deg, theta_r_deg, ret_reason, ret_keep_out);
     if (shadow && (went || *ret_reason != PLAN_SKIP_LIMITS)) {
         m->at = before;
         *ret_reason = PLAN_SKIP_BLIND;
+        *ret_keep_out = -1;
         return false;
     }
-    m->skips_in[keep_out >= 0 ? keep_out : 0] += keep_out >= 0;
     return went;
 }
 
-static int add_sweep(struct maker *m, int sweep, double theta_i_deg, struct gon_error *err)
+// A way that a keep-out cuts off may be open in another state, where the bench comes from
+// elsewhere.
+static bool listed(const struct plan *p, int sweep, double theta_r_deg)
+{
+    for (int i = p->skips_count - 1; i >= 0 && p->skips[i].sweep == sweep; i--)
+        if (p->skips[i].theta_r_deg == theta_r_deg)
+            return true;
+    return false;
+}
+
+// One state's directions; *point counts on from state to state.
+static int add_directions(struct maker *m, int sweep, double theta_i_deg, int n,
+                          const struct campaign_channel *channel, int *point, struct gon_error *err)
 {
     const struct campaign_config *c = m->config;
-    int n = directions(m, theta_i_deg), point = 0, rc = GON_OK;
+    const bool first = channel == m->channels;
+    int rc = GON_OK;
     for (int k = 0; k < n && rc >= 0; k++) {
         const double theta_r_deg = units_deg_of_udeg(m->directions_udeg[k]);
         enum plan_skip_reason reason;
         const bool dense = in_dense_zone(c, theta_i_deg, theta_r_deg);
-        if (!takes(m, theta_i_deg, theta_r_deg, &reason))
-            rc = add_skip(m, &(struct plan_skip){sweep, theta_i_deg, theta_r_deg, reason}, err);
-        else
+        int keep_out = -1;
+        const bool skip = !takes(m, theta_i_deg, theta_r_deg, &reason, &keep_out);
+        if (skip && (first || !listed(&m->plan, sweep, theta_r_deg)))
+            rc = add_skip(m, &(struct plan_skip){sweep, theta_i_deg, theta_r_deg, reason}, keep_out,
+                          err);
+        else if (!skip)
             rc = add_point(m,
                            &(struct plan_point){.sweep = sweep,
-                                                .point = point++,
+                                                .point = (*point)++,
                                                 .kind = PLAN_SAMPLE,
                                                 .theta_i_deg = theta_i_deg,
                                                 .theta_r_deg = theta_r_deg,
+                                                .pol_in = channel->in,
+                                                .pol_out = channel->out,
                                                 .weight = dense ? c->dense_weight : 1.0,
                                                 .dense = dense},
                            err);
@@ -196,12 +219,26 @@ static int add_sweep(struct maker *m, int sweep, double theta_i_deg, struct gon_
     return rc;
 }
 
+static int add_sweep(struct maker *m, int sweep, double theta_i_deg, struct gon_error *err)
+{
+    const int n = directions(m, theta_i_deg);
+    int point = 0, rc = GON_OK;
+    for (int i = 0; i < m->channels_count && rc >= 0; i++)
+        rc = add_directions(m, sweep, theta_i_deg, n, &m->channels[i], &point, err);
+    return rc;
+}
+
 // Both references stand at the beam's station, so that nothing moves between them.
-static int add_reference(struct maker *m, int sweep, int point, enum plan_kind kind,
+static int add_reference(struct maker *m, int sweep, int point, enum plan_kind kind, int pol_in,
                          struct gon_error *err)
 {
-    struct plan_point p = {
-        .sweep = sweep, .point = point, .kind = kind, .station = "beam", .weight = 1.0};
+    struct plan_point p = {.sweep = sweep,
+                           .point = point,
+                           .kind = kind,
+                           .station = "beam",
+                           .pol_in = pol_in,
+                           .pol_out = plan_beam_out(m->config, m->bench, pol_in),
+                           .weight = 1.0};
     const struct bench_station *s = m->bench ? bench_find_station(m->bench, p.station) : NULL;
     if (s) {
         p.theta_i_deg = s->theta_i_deg;
@@ -211,17 +248,33 @@ static int add_reference(struct maker *m, int sweep, int point, enum plan_kind k
     return rc < 0 ? rc : add_point(m, &p, err);
 }
 
+// States of the light in the order of the channels, each once.
+static int states_of_light(const struct maker *m, int states[POL_COUNT])
+{
+    int n = 0;
+    for (int i = 0; i < m->channels_count; i++) {
+        int k = 0;
+        while (k < n && states[k] != m->channels[i].in)
+            k++;
+        if (k == n)
+            states[n++] = m->channels[i].in;
+    }
+    return n;
+}
+
 static int add_all(struct maker *m, struct gon_error *err)
 {
     const struct campaign_config *c = m->config;
-    int rc = add_reference(m, 0, 0, PLAN_DARK, err);
-    if (rc >= 0)
-        rc = add_reference(m, 0, 1, PLAN_BEAM, err);
+    const int last = c->theta_i_count + 1;
+    int states[POL_COUNT] = {0}, n = states_of_light(m, states);
+    int rc = add_reference(m, 0, 0, PLAN_DARK, states[0], err);
+    for (int i = 0; i < n && rc >= 0; i++)
+        rc = add_reference(m, 0, 1 + i, PLAN_BEAM, states[i], err);
     for (int i = 0; i < c->theta_i_count && rc >= 0; i++)
         rc = add_sweep(m, i + 1, units_deg_of_udeg(units_udeg(c->theta_i_deg[i])), err);
-    if (rc >= 0)
-        rc = add_reference(m, c->theta_i_count + 1, 0, PLAN_BEAM, err);
-    return rc >= 0 ? add_reference(m, c->theta_i_count + 1, 1, PLAN_DARK, err) : rc;
+    for (int i = 0; i < n && rc >= 0; i++)
+        rc = add_reference(m, last, i, PLAN_BEAM, states[i], err);
+    return rc >= 0 ? add_reference(m, last, n, PLAN_DARK, states[n - 1], err) : rc;
 }
 
 // --- warnings ------------------------------------------------------------------------------------
@@ -267,16 +320,38 @@ static void warn_of_directions(struct maker *m)
              c->theta_i_count, c->theta_i_count == 1 ? "" : "s");
 }
 
+static void warn_of_state(struct maker *m, bool in, int state)
+{
+    char text[sizeof *m->plan.warnings];
+    if (plan_state_warning(m->bench, in, state, text, sizeof text) > 0)
+        warn(m, "%s", text);
+}
+
+static void warn_of_beam(struct maker *m, int in)
+{
+    const int out = plan_beam_out(m->config, m->bench, in);
+    if (m->bench->polarisation.pol_out.count && out != POL_U)
+        warn(m,
+             "the analyser cannot be taken out: the beam of pol_in = \"%s\" is measured behind it "
+             "at \"%s\", where it passes %g of the light",
+             polarisation_name((enum polarisation)in), polarisation_name((enum polarisation)out),
+             polarisation_passed((enum polarisation)in, (enum polarisation)out));
+}
+
 static void warn_of_polarisation(struct maker *m)
 {
-    const struct campaign_config *c = m->config;
-    if (m->bench && c->pol_in != POL_IN_LASER && c->pol_in != m->bench->laser.polarisation)
-        warn(m,
-             "pol_in = \"%s\", but the bench says that its laser is \"%s\": an element must be in "
-             "the beam",
-             polarisation_name((enum polarisation)c->pol_in),
-             polarisation_name((enum polarisation)m->bench->laser.polarisation));
-    if (m->bench && c->pol_in == POL_IN_LASER && m->bench->laser.polarisation == POL_UNKNOWN)
+    bool seen_in[POL_COUNT] = {false}, seen_out[POL_COUNT] = {false};
+    for (int i = 0; m->bench && i < m->channels_count; i++) {
+        const struct campaign_channel *c = &m->channels[i];
+        if (!seen_in[c->in])
+            warn_of_state(m, true, c->in);
+        if (!seen_in[c->in])
+            warn_of_beam(m, c->in);
+        if (!seen_out[c->out])
+            warn_of_state(m, false, c->out);
+        seen_in[c->in] = seen_out[c->out] = true;
+    }
+    if (seen_in[POL_UNKNOWN])
         warn(m, "the laser's polarisation is unknown: what is measured is f_00 + m f_01 with "
                 "unknown m");
 }
@@ -339,6 +414,7 @@ static int readings_of(const struct campaign_config *c, enum plan_kind kind)
                                : c->readings;
 }
 
+// The directions' axes move together, after the elements; the sample goes in and out once each way.
 // Changes of range are not in it.
 static double duration_s(const struct maker *m)
 {
@@ -348,13 +424,33 @@ static double duration_s(const struct maker *m)
     const double settle = plan_settle_s(b->detector.time_constant_s, b->detector.slope_db);
     const double spacing = plan_spacing_s(b->detector.time_constant_s, b->detector.slope_db);
     double total = b->laser.warmup_s + m->at.moves_s;
-    for (int i = 0; i < m->plan.count; i++)
-        total +=
-            OVERHEAD_S + settle + spacing * (readings_of(m->config, m->plan.points[i].kind) - 1);
+    for (int i = 0; i < m->plan.count; i++) {
+        const struct plan_point *p = &m->plan.points[i];
+        total += i ? plan_states_move_s(b, p - 1, p) : 0;
+        total += OVERHEAD_S + settle + spacing * (readings_of(m->config, p->kind) - 1);
+    }
     return total;
 }
 
 // --- all of it -----------------------------------------------------------------------------------
+
+// Of "laser" what the bench says; the same state twice would be measured twice as one.
+static int take_channels(struct maker *m, struct gon_error *err)
+{
+    m->channels_count = campaign_channels(m->config, m->channels);
+    for (int i = 0; i < m->channels_count; i++) {
+        struct campaign_channel *c = &m->channels[i];
+        if (c->in == POL_IN_LASER && m->bench)
+            c->in = m->bench->laser.polarisation;
+        for (int k = 0; k < i; k++)
+            if (m->channels[k].in == c->in && m->channels[k].out == c->out)
+                return gon_fail(err, GON_E_INPUT,
+                                "pol_in: \"laser\" is \"%s\" on this bench, which is in the list "
+                                "too; each state once",
+                                polarisation_name((enum polarisation)c->in));
+    }
+    return GON_OK;
+}
 
 int plan_make(const struct campaign_config *config, const struct bench_config *bench,
               struct plan *ret_plan, struct gon_error *err)
@@ -366,8 +462,10 @@ int plan_make(const struct campaign_config *config, const struct bench_config *b
     m.plan.sweeps = config->theta_i_count;
     m.plan.warnings = calloc(MOST_WARNINGS, sizeof *m.plan.warnings);
     m.directions_udeg = calloc(MOST_DIRECTIONS, sizeof *m.directions_udeg);
-    rc = m.plan.warnings && m.directions_udeg ? add_all(&m, err)
+    rc = m.plan.warnings && m.directions_udeg ? take_channels(&m, err)
                                               : gon_fail(err, GON_E_SYSTEM, "plan: out of memory");
+    if (rc >= 0)
+        rc = add_all(&m, err);
     free(m.directions_udeg);
     if (rc >= 0 && m.plan.samples == 0)
         rc = gon_fail(err, GON_E_INPUT, "nothing is left to measure: all %d points are skipped",

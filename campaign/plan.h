@@ -2,11 +2,15 @@
 // The plan: every point of a campaign in the order of measurement. Computed from the configuration
 // alone, and from the bench where there is one; moves nothing. Thread: any.
 //
-//   sweep 0            dark (laser off), then the beam
+//   sweep 0            dark (laser off), then the beam in each state of the light
 //   sweep 1..sweeps    one theta_i each, in the file's order; theta_r from low to high, so that the
 //                      axis always comes from the same side; coarse grid and dense zone merged, a
 //                      direction that both ask for is measured once
-//   sweep sweeps + 1   the beam again, then dark (laser off)
+//   sweep sweeps + 1   the beam again in each state, then dark (laser off)
+//
+// With several states of polarisation a sweep is measured in one after the other, all directions
+// in each: elements move slowly, so they move once a state and not once a direction; and the fit
+// after a sweep, or a campaign that was stopped, has every state of the sweeps it has.
 #pragma once
 #include "base/err.h"
 #include "campaign/bench.h"
@@ -30,6 +34,7 @@ struct plan_point {
     char station[BENCH_NAME]; // "" on the sample
     double theta_i_deg;       // nominal, multiples of 1e-6; of a station with a bench, else 0
     double theta_r_deg;       // signed: positive forward
+    int pol_in, pol_out;      // enum polarisation; unknown also where "laser" has no bench
     double weight;            // g of eq. 17
     bool dense;               // within the dense zone
     bool done;                // has an accepted reading; false in a new plan

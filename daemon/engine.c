@@ -134,8 +134,9 @@ static void provisional(const struct engine *e, const struct acquire_reading *r,
     const struct engine_opening *o = &e->opening;
     const bool monitored = isfinite(r->monitor_v);
     const double signal_v = r->signal_v - o->dark_signal_v;
-    const double beam = (o->beam_signal_v - o->dark_signal_v) /
-                        (monitored ? o->beam_monitor_v - o->dark_monitor_v : 1.0);
+    const int in = e->point->pol_in;
+    const double beam = (o->beam_signal_v[in] - o->dark_signal_v) /
+                        (monitored ? o->beam_monitor_v[in] - o->dark_monitor_v : 1.0);
     const double ratio = signal_v / (monitored ? r->monitor_v - o->dark_monitor_v : 1.0) / beam;
     const double cosine = cos(
         units_rad(instrument_bench(e->in)->regime == BENCH_OVERFILLED ? theta_i_deg : theta_r_deg));
@@ -168,9 +169,9 @@ static void remember(struct engine *e, const struct acquire_reading *r)
             e->opening.dark_signal_v = r->signal_v;
             e->opening.dark_monitor_v = r->monitor_v;
         }
-    } else if (e->point->kind == PLAN_BEAM && isnan(e->opening.beam_signal_v)) {
-        e->opening.beam_signal_v = r->signal_v;
-        e->opening.beam_monitor_v = r->monitor_v;
+    } else if (e->point->kind == PLAN_BEAM && isnan(e->opening.beam_signal_v[e->point->pol_in])) {
+        e->opening.beam_signal_v[e->point->pol_in] = r->signal_v;
+        e->opening.beam_monitor_v[e->point->pol_in] = r->monitor_v;
     }
 }
 
@@ -420,8 +421,10 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .omega_sr = bench_omega_sr(bench),
         .monitor_dark_v = (double)NAN,
         .monitor_lit_v = (double)NAN,
-        .opening = {(double)NAN, (double)NAN, (double)NAN, (double)NAN},
+        .opening = {.dark_signal_v = (double)NAN, .dark_monitor_v = (double)NAN},
     };
+    for (int i = 0; i < POL_COUNT; i++)
+        e.opening.beam_signal_v[i] = e.opening.beam_monitor_v[i] = (double)NAN;
     if (ports->opening) {
         e.opening = *ports->opening;
         e.monitor_dark_v = e.opening.dark_monitor_v;
