@@ -335,8 +335,7 @@ static void add_leaks(struct reduction *r, const struct plan *plan, const struct
     }
 }
 
-// By what the beam's ratio is multiplied because of the analyser, before the beam or the sample.
-static double analyser(const struct bench_polarisation *p, int pol_in, int beam_out, int pol_out,
+double reduce_analyser(const struct bench_polarisation *p, int pol_in, int beam_out, int pol_out,
                        double *ret_u_rel)
 {
     const double of_sample = pol_out == POL_U ? 1 : p->transmission;
@@ -399,8 +398,8 @@ static int add_channel(struct reduction *r, const struct references *f,
     const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
     const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
     *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};
-    c->beam_ratio = ratio * analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
-                                     &c->u_analyser_rel);
+    c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
+                                            &c->u_analyser_rel);
     c->u_beam_rel = hypot(mean_u(&beam->ratio) / ratio,
                           hypot(noise, r->noise.rel_monitor) / sqrt(beam->samples));
     c->u_scale_rel = hypot(hypot(c->u_beam_rel, c->u_analyser_rel), shared);

@@ -5,6 +5,8 @@
 #include "campaign/bench.h"
 #include "campaign/config.h"
 #include "campaign/plan.h"
+#include "campaign/plan_states.h"
+#include "campaign/reduce.h"
 #include "campaign/store.h"
 #include "daemon/acquire.h"
 #include "daemon/engine_inside.h"
@@ -126,6 +128,15 @@ static double u_of_mean(double sd, int count)
     return count > 1 ? sd / sqrt(count) : 0.0;
 }
 
+static double analyser(const struct engine *e)
+{
+    double u_rel;
+    const struct bench_config *bench = instrument_bench(e->in);
+    const int in = e->point->pol_in;
+    return reduce_analyser(&bench->polarisation, in, plan_beam_out(e->config, bench, in),
+                           e->point->pol_out, &u_rel);
+}
+
 // Underfilled or overfilled f_r (formulas: campaign/reduce.h) with the opening references; the last
 // word is reduce's.
 static void provisional(const struct engine *e, const struct acquire_reading *r, double theta_i_deg,
@@ -143,7 +154,7 @@ static void provisional(const struct engine *e, const struct acquire_reading *r,
     const double u_signal_v = u_of_mean(r->signal_sd_v, r->count);
     const double u_monitor =
         monitored ? u_of_mean(r->monitor_sd_v, r->count) / (r->monitor_v - o->dark_monitor_v) : 0.0;
-    *ret_f = ratio / (e->omega_sr * cosine);
+    *ret_f = ratio / (e->omega_sr * cosine * analyser(e));
     *ret_u = fabs(*ret_f) * hypot(u_signal_v / signal_v, u_monitor);
 }
 
@@ -229,10 +240,10 @@ static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;
     struct travel_pose pose = travel_stay();
-    int rc = 0;
-    if (p->kind == PLAN_SAMPLE)
+    int rc = engine_turn_elements(e);
+    if (rc >= 0 && p->kind == PLAN_SAMPLE)
         rc = travel_to_sample(e->in, p->theta_i_deg, p->theta_r_deg, &pose, &e->why);
-    else if (p->kind != PLAN_DARK || p->station[0])
+    else if (rc >= 0 && (p->kind != PLAN_DARK || p->station[0]))
         rc = travel_station(e->in, p->station, &pose, &e->why);
     return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
 }

@@ -6,8 +6,8 @@
 //   dark (laser off) -> laser on, warm-up -> beam -> sweeps (a fit is asked for after each) -> beam
 //   -> laser off -> dark -> last fit
 //
-// The elements of polarisation move before the directions' axes, whenever a point's states are not
-// those of the point before, and after each pause; the light may stay on.
+// The elements of polarisation stand at a point's states before the directions' axes move; the
+// light may stay on.
 //
 // The laser is on from warm-up to the last beam reading and off on every way out. A device that is
 // gone or does not answer pauses the run in a safe state (emission off where the laser can be

@@ -55,7 +55,7 @@ struct port *bench_port(struct bench *b, enum bench_port which)
 {
     int tcp = which % 2;
     switch (which) {
-    case BENCH_AXES:
+    case BENCH_AXES_RTU:
     case BENCH_AXES_TCP: return &b->axes_port[tcp].port;
     case BENCH_LASER:
     case BENCH_LASER_TCP: return &b->laser_port[tcp].port;

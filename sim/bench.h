@@ -10,7 +10,7 @@
 #include "sim/world.h"
 
 enum bench_port {
-    BENCH_AXES,
+    BENCH_AXES_RTU,
     BENCH_AXES_TCP,
     BENCH_LASER,
     BENCH_LASER_TCP,

@@ -413,8 +413,8 @@ static inline void simbench_detector_free(struct detector *d)
     (void)d;
 }
 
-// A world with its devices, at t = 1 s. Change spec's defaults through tune (may be NULL).
-static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
+// A world with its devices, at t = 1 s.
+static inline void simbench_init_world(struct simbench *b, const struct world_spec *spec)
 {
     static const struct axis_ops axis_ops = {
         simbench_axis_identify, simbench_axis_status, simbench_axis_move,  simbench_axis_stop,
@@ -438,23 +438,29 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
                                                      .condition = simbench_detector_condition,
                                                      .reopen = simbench_detector_reopen,
                                                      .free = simbench_detector_free};
-    struct world_spec spec;
     *b = (struct simbench){
         .laser = {&laser_ops}, .detector = {&detector_ops}, .gone_for_ns = CLK_S(3)};
     clk_virtual_init(&b->clk, CLK_S(1), CLK_S(1700000000));
-    world_defaults(&spec);
-    if (tune)
-        tune(&spec);
-    world_init(&b->world, &spec, b->clk.t_ns);
+    world_init(&b->world, spec, b->clk.t_ns);
     for (int i = 0; i < WORLD_AXES; i++)
         b->axis[i] = (struct simbench_axis){
             .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
 }
 
+// The same of the defaults, changed through tune (may be NULL).
+static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
+{
+    struct world_spec spec;
+    world_defaults(&spec);
+    if (tune)
+        tune(&spec);
+    simbench_init_world(b, &spec);
+}
+
 static inline struct instrument_parts simbench_parts(struct simbench *b)
 {
     struct instrument_parts parts = {.laser = &b->laser, .detector = &b->detector};
-    for (int i = 0; i < WORLD_AXES; i++)
+    for (int i = 0; i < world_axes(&b->world.spec); i++)
         parts.axis[i] = &b->axis[i].axis;
     return parts;
 }

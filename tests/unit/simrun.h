@@ -261,14 +261,13 @@ static inline void quick_laser(struct world_spec *spec)
     spec->laser.warmup_s = 5;
 }
 
-static inline struct run *begin(void (*tune)(struct world_spec *spec))
+static inline struct run *begin_on(const struct world_spec *spec, const struct bench_config *bench)
 {
     struct run *r = calloc(1, sizeof *r);
-    simbench_init(&r->b, tune ? tune : quick_laser);
+    simbench_init_world(&r->b, spec);
     r->b.clk.on_advance = advanced;
     r->b.clk.ctx = r;
-    simconfig_bench(&r->bench);
-    r->bench.laser.warmup_s = 5;
+    r->bench = *bench;
     r->config.readings = 4;
     r->config.dark_readings = 8;
     r->config.beam_readings = 8;
@@ -285,6 +284,18 @@ static inline struct run *begin(void (*tune)(struct world_spec *spec))
                                      .take_pause = port_pause};
     struct instrument_parts parts = simbench_parts(&r->b);
     assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
+    return r;
+}
+
+static inline struct run *begin(void (*tune)(struct world_spec *spec))
+{
+    struct world_spec spec;
+    struct bench_config bench;
+    world_defaults(&spec);
+    (tune ? tune : quick_laser)(&spec);
+    simconfig_bench(&bench);
+    bench.laser.warmup_s = 5;
+    struct run *r = begin_on(&spec, &bench);
     small_plan(r);
     return r;
 }
