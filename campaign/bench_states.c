@@ -163,18 +163,39 @@ static int check_state(struct cfg_file *f, const struct bench_config *b, const s
     return mistakes + check_same_axes(f, path, s, &side->states->state[0]);
 }
 
+static bool belongs(const struct bench_states *s, const char *axis)
+{
+    return s->count && placed(&s->state[0], axis);
+}
+
+// A station would move an element away from the state that is measured there.
+static int check_stations(struct cfg_file *f, const struct bench_config *b)
+{
+    char path[80];
+    int mistakes = 0;
+    for (int i = 0; i < b->stations_count; i++)
+        for (int k = 0; k < b->stations[i].marks_count; k++) {
+            const char *axis = b->stations[i].marks[k].name;
+            snprintf(path, sizeof path, "stations[%d].axes[%d].name", i, k);
+            if (belongs(&b->polarisation.pol_in, axis) || belongs(&b->polarisation.pol_out, axis))
+                mistakes += cfg_complain(f, path,
+                                         "stands as the states of polarisation say, not "
+                                         "where a station does");
+        }
+    return mistakes;
+}
+
 int bench_states_check(struct cfg_file *f, const struct bench_config *b)
 {
     const struct bench_polarisation *p = &b->polarisation;
     const struct side sides[] = {{"pol_in", &p->pol_in}, {"pol_out", &p->pol_out}};
-    int mistakes = 0;
+    int mistakes = check_stations(f, b);
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < sides[i].states->count; k++)
             mistakes += check_state(f, b, &sides[i], k);
-    for (int k = 0; p->pol_in.count && p->pol_out.count && k < p->pol_out.state[0].axes_count;
-         k++) {
+    for (int k = 0; p->pol_out.count && k < p->pol_out.state[0].axes_count; k++) {
         const char *axis = p->pol_out.state[0].axes[k].name;
-        if (placed(&p->pol_in.state[0], axis))
+        if (belongs(&p->pol_in, axis))
             mistakes +=
                 cfg_complain(f, "polarisation.pol_out", "axis %s belongs to pol_in already", axis);
     }

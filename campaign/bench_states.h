@@ -5,8 +5,8 @@
 // is printed from its table. Thread: any.
 //
 // Each state of a side places every axis of that side, so that what stands in the beam never
-// depends on the state before; and no axis belongs to both sides. A polariser's angle counts from
-// s towards +45.
+// depends on the state before; no axis belongs to both sides, and stations do not place it. A
+// polariser's angle counts from s towards +45.
 #pragma once
 #include "base/cfg.h"
 #include "base/err.h"

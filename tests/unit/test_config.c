@@ -286,6 +286,10 @@ static void mistakes_in_states_name_their_lines(void **state)
                     "theta_r stands, as state \"u\" of this side does\n"
                     "b.cfg:23: polarisation.pol_out[2].axes = ( ... ): places axis analyser, and "
                     "state \"u\" of this side does not say where that stands\n");
+    states_complain("sample_mm = 30.0; }",
+                    "sample_mm = 30.0; axes = ( { name = \"analyser\"; at = 0.0; } ); }",
+                    "b.cfg:17: stations[0].axes[0].name = \"analyser\": stands as the states of "
+                    "polarisation say, not where a station does\n");
     states_complain("transmission = 0.8", "transmission = 1.8",
                     "b.cfg:25: polarisation.analyser.transmission = 1.8: out of range; allowed "
                     "0.01..1\n");
