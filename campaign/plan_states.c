@@ -118,9 +118,26 @@ static int check_side(const struct plan *plan, const struct bench_config *bench,
     return GON_OK;
 }
 
+static int check_beams(const struct plan *plan, const struct bench_config *bench,
+                       struct gon_error *err)
+{
+    for (int i = 0; i < plan->count && bench->polarisation.pol_out.count; i++) {
+        const struct plan_point *p = &plan->points[i];
+        if (p->kind == PLAN_BEAM &&
+            polarisation_passed((enum polarisation)p->pol_in, (enum polarisation)p->pol_out) == 0)
+            return gon_fail(err, GON_E_INPUT,
+                            "no state of pol_out lets the beam of pol_in = \"%s\" through; add "
+                            "\"u\" or \"%s\" to group polarisation of the bench file",
+                            name_of(p->pol_in), name_of(p->pol_in));
+    }
+    return GON_OK;
+}
+
 int plan_check_states(const struct plan *plan, const struct bench_config *bench,
                       struct gon_error *err)
 {
     int rc = check_side(plan, bench, true, err);
-    return rc < 0 ? rc : check_side(plan, bench, false, err);
+    if (rc >= 0)
+        rc = check_side(plan, bench, false, err);
+    return rc < 0 ? rc : check_beams(plan, bench, err);
 }

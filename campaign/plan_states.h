@@ -19,7 +19,7 @@ int plan_state_warning(const struct bench_config *bench, bool in, int state, cha
                        size_t size);
 
 // Before a campaign begins. GON_E_INPUT: the plan asks for a state that no element of the bench
-// makes, where elements move or where there are several states; a single state without any element
-// is the operator's.
+// makes, where elements move or where there are several states (a single state without any element
+// is the operator's); or no state of the analyser lets one of the beams through.
 int plan_check_states(const struct plan *plan, const struct bench_config *bench,
                       struct gon_error *err);

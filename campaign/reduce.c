@@ -2,6 +2,7 @@
 #include "campaign/reduce.h"
 
 #include "base/units.h"
+#include "campaign/reduce_elements.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -243,14 +244,6 @@ static bool reduce_point(const struct reduction *r, const struct store_reading *
     return isfinite(p->f_per_sr);
 }
 
-static const struct reduce_channel *channel_of(const struct reduction *r, int pol_in, int pol_out)
-{
-    for (int i = 0; i < r->channels; i++)
-        if (r->channel[i].pol_in == pol_in && r->channel[i].pol_out == pol_out)
-            return &r->channel[i];
-    return NULL;
-}
-
 static int reduce_points(struct reduction *r, const struct plan *plan,
                          const struct store_reading *rows, int count, struct gon_error *err)
 {
@@ -272,83 +265,12 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
                                     .theta_i_deg = units_deg_of_udeg(row->theta_i_udeg),
                                     .theta_r_deg = units_deg_of_udeg(row->theta_r_udeg),
                                     .weight = point->weight};
-        if (reduce_point(r, row, channel_of(r, p->pol_in, p->pol_out), p))
+        if (reduce_point(r, row, reduce_channel_of(r, p->pol_in, p->pol_out), p))
             r->count++;
         else
             r->left_out++;
     }
     return GON_OK;
-}
-
-// --- elements ------------------------------------------------------------------------------------
-
-static const struct plan_point *in_channel(const struct plan *plan, const struct reduction *r,
-                                           int k, const struct reduce_channel *c)
-{
-    const struct plan_point *p = k < r->count ? &plan->points[r->points[k].index] : NULL;
-    return p && p->pol_in == c->pol_in && p->pol_out == c->pol_out ? p : NULL;
-}
-
-// Of two points of the sample: before, the same direction, behind.
-static int by_direction(const struct plan_point *a, const struct plan_point *b)
-{
-    if (a->sweep != b->sweep)
-        return a->sweep < b->sweep ? -1 : 1;
-    return (a->theta_r_deg > b->theta_r_deg) - (a->theta_r_deg < b->theta_r_deg);
-}
-
-// What leaks of the crossed channel (NULL: not measured) into u_B of this one. In each channel
-// directions rise within a sweep.
-static void add_leak(struct reduction *r, const struct plan *plan, const struct reduce_channel *c,
-                     const struct reduce_channel *crossed, double extinction)
-{
-    for (int k = 0, other = 0; k < r->count; k++) {
-        const struct plan_point *p = in_channel(plan, r, k, c), *q = NULL;
-        struct reduced_point *point = &r->points[k];
-        double leak_per_sr = point->f_per_sr;
-        if (!p)
-            continue;
-        for (; crossed && other < r->count; other++)
-            if ((q = in_channel(plan, r, other, crossed)) && by_direction(q, p) >= 0)
-                break;
-        if (q && by_direction(q, p) == 0)
-            leak_per_sr = r->points[other].f_per_sr;
-        point->u_b_per_sr = hypot(point->u_b_per_sr, extinction * leak_per_sr / sqrt(3));
-    }
-}
-
-static int crossed(int state)
-{
-    return polarisation_crossed((enum polarisation)state);
-}
-
-static void add_leaks(struct reduction *r, const struct plan *plan, const struct bench_config *b)
-{
-    const struct bench_polarisation *p = &b->polarisation;
-    for (int i = 0; i < r->channels; i++) {
-        const struct reduce_channel *c = &r->channel[i];
-        if (p->pol_in.count && c->pol_in != POL_U && p->polariser_extinction > 0)
-            add_leak(r, plan, c, channel_of(r, crossed(c->pol_in), c->pol_out),
-                     p->polariser_extinction);
-        if (p->pol_out.count && c->pol_out != POL_U && p->extinction > 0)
-            add_leak(r, plan, c, channel_of(r, c->pol_in, crossed(c->pol_out)), p->extinction);
-    }
-}
-
-double reduce_analyser(const struct bench_polarisation *p, int pol_in, int beam_out, int pol_out,
-                       double *ret_u_rel)
-{
-    const double of_sample = pol_out == POL_U ? 1 : p->transmission;
-    const double of_beam = beam_out == POL_U
-                               ? 1
-                               : p->transmission * polarisation_passed((enum polarisation)pol_in,
-                                                                       (enum polarisation)beam_out);
-    *ret_u_rel = 0;
-    if (p->pol_out.count == 0)
-        return 1;
-    if ((pol_out == POL_U) != (beam_out == POL_U))
-        *ret_u_rel = p->u_transmission / p->transmission;
-    return of_sample / of_beam;
 }
 
 // --- all of it -----------------------------------------------------------------------------------
@@ -417,7 +339,7 @@ static int reduce_channels(struct reduction *r, const struct references *f,
     int rc = GON_OK;
     for (int i = 0; i < plan->count && rc >= 0; i++) {
         const struct plan_point *p = &plan->points[i];
-        if (p->kind == PLAN_SAMPLE && !channel_of(r, p->pol_in, p->pol_out))
+        if (p->kind == PLAN_SAMPLE && !reduce_channel_of(r, p->pol_in, p->pol_out))
             rc = r->channels < CAMPAIGN_CHANNELS
                      ? add_channel(r, f, bench, p, err)
                      : gon_fail(err, GON_E_INPUT, "the plan has more states than there are");
@@ -444,7 +366,7 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
         rc = reduce_points(&r, plan, rows, count, err);
     if (rc < 0)
         return rc;
-    add_leaks(&r, plan, bench);
+    reduce_add_leaks(&r, plan, bench);
     *ret_reduction = r;
     return GON_OK;
 }

@@ -99,11 +99,6 @@ void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL i
 struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
                                        int count);
 
-// What a reading is divided by because of the analyser: what it passed of the sample's light over
-// what it passed of the beam's, measured at beam_out. 1 on a bench without pol_out states.
-double reduce_analyser(const struct bench_polarisation *p, int pol_in, int beam_out, int pol_out,
-                       double *ret_u_rel);
-
 // The noise model alone.
 struct reduce_noise reduce_noise_of(const struct plan *plan, const struct store_reading *rows,
                                     int count);

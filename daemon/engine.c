@@ -6,7 +6,7 @@
 #include "campaign/config.h"
 #include "campaign/plan.h"
 #include "campaign/plan_states.h"
-#include "campaign/reduce.h"
+#include "campaign/reduce_elements.h"
 #include "campaign/store.h"
 #include "daemon/acquire.h"
 #include "daemon/engine_inside.h"

@@ -349,6 +349,14 @@ static void an_analyser_that_stays_is_parallel_to_the_beam(void **state)
     assert_true(warns(&p,
                       "the beam of pol_in = \"p\" is measured behind it at \"p\", where it passes "
                       "1 of the light"));
+    assert_int_equal(plan_check_states(&p, &b, NULL), 0);
+    plan_clear(&p);
+    struct gon_error err;
+    b.polarisation.pol_out.count = 1; // s alone
+    p = planned(STATES("pol_in = \"p\"; pol_out = \"s\";"), &b);
+    assert_int_equal(plan_check_states(&p, &b, &err), GON_E_INPUT);
+    assert_non_null(
+        strstr(err.text, "lets the beam of pol_in = \"p\" through; add \"u\" or \"p\""));
     plan_clear(&p);
 }
 

@@ -554,8 +554,9 @@ static int64_t number(const char *sql)
 static void several_states_are_kept_and_make_version_2(void **state)
 {
     (void)state;
-    static const char states[] = "campaign: { name = \"a\"; theta_i_deg = (10, 20); pol_in = (\"s\", "
-                                 "\"p\"); dense: { half_width_deg = 0; }; };";
+    static const char states[] =
+        "campaign: { name = \"a\"; theta_i_deg = (10, 20); pol_in = (\"s\", \"p\");"
+        " dense: { half_width_deg = 0; }; };";
     struct plan made, kept;
     const struct campaign_config c = fixture_campaign(states);
     const struct bench_config bench = fixture_bench();
@@ -600,7 +601,8 @@ static void a_file_of_version_1_is_read_and_written_on(void **state)
     assert_true(r.count == 4 && r.beams == 2 && r.darks == 1 && r.polarisation == POL_S);
     for (int i = 0; i < 4; i++) { // the elements of that time were the operator's: nothing over T
         const double cosine = cos(units_rad(i % 2 ? 30 : 0));
-        assert_true(fabs(r.points[i].f_per_sr * r.omega_sr * cosine / (1e-3 * (i + 2)) - 0.5) < 1e-9);
+        const double ratio = r.points[i].f_per_sr * r.omega_sr * cosine;
+        assert_true(fabs(ratio / (1e-3 * (i + 2)) - 0.5) < 1e-9);
     }
     assert_int_equal(store_append_reduction(s, 1, &r, NULL, NULL), 0);
     const struct store_reading dark = reading(3, 1, 1);
