@@ -274,7 +274,9 @@ static void look_at(struct bus *bus, struct look *k)
 static void explain_axis(struct finding *f, const struct look *k)
 {
     const struct bench_axis *c = k->config;
-    const double position = k->status.position_steps / c->steps_per_unit + c->zero;
+    const double encoder_steps = c->encoder_steps > 0 ? c->encoder_steps : 1.0;
+    const double position =
+        k->status.position_steps / (encoder_steps * c->steps_per_unit) + c->zero;
     if (k->status.alarm)
         explain_alarm(f, k->status.alarm_code, k->alarm);
     else if (k->status.moving)

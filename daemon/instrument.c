@@ -15,9 +15,6 @@
 #define SLICE_NS CLK_MS(100)
 #define QUIET_MS 100 // the slowest answer of a unit that is to be drained after an error
 
-static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser",
-                                                   "detector"};
-
 // --- time -------------------------------------------------------------------------------------
 
 static int64_t breathing_now_ns(const struct clk *clk)
@@ -239,41 +236,51 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     in->sample = (struct detector_sample){(double)NAN, (double)NAN, (double)NAN};
     in->laser = (struct laser_status){.power_w = (double)NAN, .setpoint_w = (double)NAN};
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
-        in->part[part] = (struct part_state){
-            .name = part_names[part], .link = PART_LOST, .driver = "", .address = ""};
+        in->part[part] =
+            (struct part_state){.name = "", .link = PART_LOST, .driver = "", .address = ""};
+    in->part[PART_LASER].name = "laser";
     in->part[PART_LASER].driver = bench_laser_drivers[bench->laser.driver];
+    in->part[PART_DETECTOR].name = "detector";
     in->part[PART_DETECTOR].driver = bench_detector_drivers[bench->detector.driver];
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
-        struct motor *m = &in->motor[part];
-        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]),
-                            .bus = -1,
-                            .commanded = (double)NAN,
-                            .seen_ns = INT64_MIN,
-                            .place = {.position = (double)NAN, .target = (double)NAN}};
-        if (m->config)
-            in->part[part].driver = bench_axis_drivers[m->config->driver];
-        else
-            in->part[part].link = PART_ABSENT;
+        const bool there = (int)part < bench->axes_count;
+        const double unknown = (double)NAN;
+        in->motor[part] = (struct motor){
+            .config = there ? &bench->axes[part] : NULL,
+            .bus = -1,
+            .commanded = unknown,
+            .seen_ns = INT64_MIN,
+            .place = {
+                .position = unknown, .target = unknown, .dial = unknown, .raw_steps = unknown}};
+        in->part[part].name = there ? bench->axes[part].name : "";
+        in->part[part].driver = there ? bench_axis_drivers[bench->axes[part].driver] : "";
+        in->part[part].link = there ? PART_LOST : PART_ABSENT;
     }
     return in;
+}
+
+// A part that is not there yet is no error; what it says to a wrong bench file is.
+static int connect_first(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    int rc = instrument_has(in, part) ? instrument_connect(in, part, err) : 0;
+    in->part[part].returns = 0; // it was not away yet
+    return rc == GON_E_INPUT || rc == GON_E_SYSTEM ? rc : 0;
 }
 
 // The laser first: its first bytes are OFF, and nothing moves before.
 static int hand_over(struct instrument *in, struct instrument **ret_instrument,
                      struct gon_error *err)
 {
-    static const enum instrument_part order[PART_COUNT] = {PART_LASER, PART_THETA_I, PART_THETA_R,
-                                                           PART_SAMPLE, PART_DETECTOR};
-    for (int i = 0; i < PART_COUNT; i++) {
-        struct gon_error own;
-        if (!instrument_has(in, order[i]))
-            continue;
-        int rc = instrument_connect(in, order[i], &own);
-        in->part[order[i]].returns = 0; // it was not away yet
-        if (rc == GON_E_INPUT || rc == GON_E_SYSTEM) {
-            instrument_free(in);
-            return gon_fail(err, (enum gon_code)rc, "%s", own.text);
-        }
+    struct gon_error own;
+    int rc = connect_first(in, PART_LASER, &own);
+    for (enum instrument_part part = 0; part < PART_COUNT && rc >= 0; part++)
+        if (part != PART_LASER)
+            rc = connect_first(in, part, &own);
+    if (rc >= 0)
+        rc = bench_kinematics(in->bench, &in->kinematics, &own);
+    if (rc < 0) {
+        instrument_free(in);
+        return gon_fail(err, (enum gon_code)rc, "%s", own.text);
     }
     *ret_instrument = in;
     return 0;
@@ -353,6 +360,11 @@ static const struct link_stats *stats_of(const struct instrument *in, enum instr
     return a->ops->stats ? a->ops->stats(a) : NULL;
 }
 
+const struct kinematics *instrument_kinematics(const struct instrument *in)
+{
+    return &in->kinematics;
+}
+
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot)
 {
     struct instrument_snapshot *s = ret_snapshot;
@@ -378,9 +390,8 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
         s->axis[i].unit = m->config ? m->config->unit_name : "";
         s->axis[i].position = m->place.position;
         s->axis[i].target = m->commanded;
-        s->axis[i].dial = m->config ? m->place.position - m->config->zero : (double)NAN;
-        s->axis[i].steps =
-            m->config ? round(s->axis[i].dial * m->config->steps_per_unit) : (double)NAN;
+        s->axis[i].dial = m->place.dial;
+        s->axis[i].raw_steps = m->place.raw_steps;
         s->axis[i].moving = m->place.moving;
         s->axis[i].homed = m->place.homed;
         s->axis[i].alarm = m->place.alarm;

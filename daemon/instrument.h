@@ -14,6 +14,7 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/err.h"
+#include "campaign/bench.h"
 #include "daemon/safety.h"
 #include "drivers/axis.h"
 #include "drivers/detector.h"
@@ -23,24 +24,20 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-struct bench_config;
-struct bench_axis;
 struct instrument;
 
+// The first parts are the axes, in the order of the bench file: part i is its axes[i].
 enum instrument_part {
-    PART_THETA_I,
-    PART_THETA_R,
-    PART_SAMPLE, // optional
-    PART_LASER,
+    INSTRUMENT_AXES = BENCH_AXES,
+    PART_LASER = INSTRUMENT_AXES,
     PART_DETECTOR,
-    PART_COUNT,
-    INSTRUMENT_AXES = PART_LASER // the first parts are the axes
+    PART_COUNT
 };
 
 enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 
 struct part_state {
-    const char *name;    // "theta_i", "theta_r", "sample", "laser", "detector"
+    const char *name;    // the axis's, "laser", "detector"; "" of an axis the bench has not
     enum part_link link; // PART_ABSENT: the bench has none
     const char *driver;  // as the bench file names it; "": absent
     const char *address; // of its link; "" when made from ready objects
@@ -60,7 +57,8 @@ struct instrument_snapshot {
     struct {
         const char *unit;        // "deg", "mm"
         double position, target; // user units; NAN: not known
-        double dial, steps;      // the same position without the zero offset, and as counted
+        double dial;             // the motor's own scale, campaign/bench.h; NAN: not known
+        double raw_steps;        // of the motor, from the encoder; NAN: not known
         bool moving, homed, alarm;
         int alarm_code;
     } axis[INSTRUMENT_AXES];
@@ -92,6 +90,7 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
 bool instrument_free(struct instrument *in);
 
 const struct bench_config *instrument_bench(const struct instrument *in);
+const struct kinematics *instrument_kinematics(const struct instrument *in);
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot);
 // Read back off by a laser that can be reached; nothing else may be called off. Any thread.
 bool instrument_is_dark(const struct instrument_snapshot *s);
@@ -123,6 +122,7 @@ bool instrument_has(const struct instrument *in, enum instrument_part part);
 
 struct axis_place {
     double position, target; // user units, from the encoder and of the last command
+    double dial, raw_steps;  // the same position, as in the snapshot
     bool moving, in_position, ready, homed, alarm;
     int alarm_code;
     const char *alarm_text;
@@ -140,9 +140,9 @@ int instrument_go(struct instrument *in, enum instrument_part part, double posit
                   struct gon_error *err);
 int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err);
 int instrument_halt(struct instrument *in, enum instrument_part part, struct gon_error *err);
-// Whether the last moves took up the play so that the load is where the encoder says: it went up by
-// at least the backlash since it last went down, was stopped or was homed. Always true without
-// backlash.
+// Whether the last moves took up the play so that the load is where the encoder says: it went the
+// way of its approach by at least the backlash since it last went the other way, was stopped or was
+// homed. Always true without backlash.
 bool instrument_engaged(const struct instrument *in, enum instrument_part part);
 // The position nearest to the one asked that is a whole number of steps.
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position);

@@ -27,6 +27,7 @@ struct motor {
 
 struct instrument {
     const struct bench_config *bench;
+    struct kinematics kinematics;
     struct breathing breathing;
     void (*watcher)(void *ctx);
     void *watcher_ctx;

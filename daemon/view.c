@@ -48,12 +48,9 @@ static void add_axis(json_t *o, const struct instrument_snapshot *s, int part)
 {
     json_object_set_new(o, "unit", json_string(s->axis[part].unit));
     json_object_set_new(o, "position", view_number(s->axis[part].position));
-    json_object_set_new(o, "dial", view_number(s->axis[part].dial));
-    json_object_set_new(o, "steps",
-                        isfinite(s->axis[part].steps)
-                            ? json_integer((json_int_t)s->axis[part].steps)
-                            : json_null());
     json_object_set_new(o, "target", view_number(s->axis[part].target));
+    json_object_set_new(o, "dial", view_number(s->axis[part].dial));
+    json_object_set_new(o, "raw_steps", view_number(s->axis[part].raw_steps));
     json_object_set_new(o, "moving", json_boolean(s->axis[part].moving));
     json_object_set_new(o, "homed", json_boolean(s->axis[part].homed));
     json_object_set_new(o, "alarm", json_boolean(s->axis[part].alarm));

@@ -9,7 +9,7 @@ const char *const bench_port_names[BENCH_PORTS] = {"axes",      "axes-tcp", "las
 void bench_defaults(struct bench_spec *ret_spec)
 {
     *ret_spec = (struct bench_spec){
-        .steps_per_unit = {1000, 1000, 1000},
+        .steps_per_unit = {1000, 1000, 1000, 1000, 1000},
         .home_speed = 10,
         .home_acceleration = 60,
         .start_s = 0.002,
@@ -43,7 +43,7 @@ void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns)
                                  .start_s = spec->start_s,
                                  .homed = spec->homed};
         sim_az_init(&b->az[i], &b->world, (enum world_axis)i, &az);
-        for (int tcp = 0; tcp < 2; tcp++)
+        for (int tcp = 0; tcp < 2 && i < world_axes(&spec->world); tcp++)
             sim_modbus_add(&b->axes_port[tcp], (struct sim_modbus_unit){.id = i + 1,
                                                                         .read = sim_az_read,
                                                                         .write = sim_az_write,
@@ -55,7 +55,7 @@ struct port *bench_port(struct bench *b, enum bench_port which)
 {
     int tcp = which % 2;
     switch (which) {
-    case BENCH_AXES:
+    case BENCH_AXES_RTU:
     case BENCH_AXES_TCP: return &b->axes_port[tcp].port;
     case BENCH_LASER:
     case BENCH_LASER_TCP: return &b->laser_port[tcp].port;

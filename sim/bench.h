@@ -10,7 +10,7 @@
 #include "sim/world.h"
 
 enum bench_port {
-    BENCH_AXES,
+    BENCH_AXES_RTU,
     BENCH_AXES_TCP,
     BENCH_LASER,
     BENCH_LASER_TCP,
@@ -33,7 +33,7 @@ struct bench_spec {
 
 struct bench {
     struct world world;
-    struct sim_az az[WORLD_AXES]; // units 1, 2, 3
+    struct sim_az az[WORLD_AXES]; // units 1, 2, 3; 4 and 5 with elements
     struct sim_cobolt laser;
     struct sim_sr830 detector;
     struct sim_modbus axes_port[2]; // serial, TCP

@@ -44,7 +44,7 @@ static struct wire *the_wire(struct request *r)
 
 static struct sim_az *the_axis(struct request *r)
 {
-    int i = name_index(r, "axis", world_axis_names, WORLD_AXES);
+    int i = name_index(r, "axis", world_axis_names, world_axes(&r->c->bench->world.spec));
     return i < 0 ? NULL : &r->c->bench->az[i];
 }
 
@@ -53,7 +53,7 @@ static struct sim_az *the_axis(struct request *r)
 static json_t *axes_state(const struct request *r)
 {
     json_t *all = json_object();
-    for (int i = 0; i < WORLD_AXES; i++) {
+    for (int i = 0; i < world_axes(&r->c->bench->world.spec); i++) {
         const struct sim_az *z = &r->c->bench->az[i];
         struct motion_state s = motion_at(&r->c->bench->world.axis[i], r->t_ns);
         json_object_set_new(all, world_axis_names[i],

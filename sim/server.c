@@ -49,7 +49,7 @@ static int open_wires(struct server *s, struct gon_error *err)
         else
             wire_pty_init(w, bench_port_names[i], bench_port(&s->bench, (enum bench_port)i), path);
         w->enforce = s->config.wire_speed;
-        w->bits = i == BENCH_AXES ? 11 : 10; // 8E1; 8N1
+        w->bits = i == BENCH_AXES_RTU ? 11 : 10; // 8E1; 8N1
     }
     for (int i = 0; i < BENCH_PORTS; i++)
         if (wire_plug(&s->wire[i], err))
@@ -87,7 +87,7 @@ static void write_serial(FILE *out, const void *ctx)
 {
     const struct server *s = ctx;
     char axes[700], laser[700], detector[700];
-    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", s->wire[BENCH_AXES].address,
+    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", s->wire[BENCH_AXES_RTU].address,
              s->config.axes_baud);
     snprintf(laser, sizeof laser, "serial:%s?baud=%d", s->wire[BENCH_LASER].address,
              s->config.laser_baud);
@@ -232,7 +232,7 @@ static int64_t next_ns(const struct server *s, int64_t most_ns)
 static void serve_wires(struct server *s, struct pollfd wire_fds[BENCH_PORTS][WIRE_FDS],
                         int64_t t_ns)
 {
-    s->bench.axes_port[0].gap_ns = wire_char_ns(&s->wire[BENCH_AXES]) * 7 / 2; // 3.5 characters
+    s->bench.axes_port[0].gap_ns = wire_char_ns(&s->wire[BENCH_AXES_RTU]) * 7 / 2; // 3.5 characters
     for (int i = 0; i < BENCH_PORTS; i++)
         wire_serve(&s->wire[i], wire_fds[i], t_ns);
 }

@@ -141,7 +141,7 @@ def test_devices_have_identity_position_and_latency(daemon):
     assert (detector["driver"], detector["serial"]) == ("sr830", "43480")
     assert laser["laser"]["emission"] is False and detector["detector"]["signal_v"] is not None
     assert axis["driver"] == "oriental-az" and axis["identity"] == "unit 1"
-    assert axis["axis"]["position"] == axis["axis"]["dial"] == axis["axis"]["steps"] == 0
+    assert axis["axis"]["position"] == axis["axis"]["dial"] == axis["axis"]["raw_steps"] == 0
 
 
 def test_the_table_names_each_device(daemon):

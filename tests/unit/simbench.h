@@ -16,6 +16,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+// simconfig's axes are the world's, in its order.
+#define PART_THETA_I ((enum instrument_part)WORLD_THETA_I)
+#define PART_THETA_R ((enum instrument_part)WORLD_THETA_R)
+#define PART_SAMPLE ((enum instrument_part)WORLD_SAMPLE)
+
 enum simbench_device { SIMBENCH_AXES, SIMBENCH_LASER, SIMBENCH_DETECTOR, SIMBENCH_DEVICES };
 
 struct simbench;
@@ -37,7 +42,7 @@ struct simbench_axis {
 struct simbench {
     struct clk_virtual clk;
     struct world world;
-    struct simbench_axis axis[INSTRUMENT_AXES];
+    struct simbench_axis axis[WORLD_AXES];
     struct laser laser;
     struct detector detector;
     struct link_stats bus; // as the axes' bus would keep it; the others have no link
@@ -415,8 +420,8 @@ static inline void simbench_detector_free(struct detector *d)
     (void)d;
 }
 
-// A world with its devices, at t = 1 s. Change spec's defaults through tune (may be NULL).
-static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
+// A world with its devices, at t = 1 s.
+static inline void simbench_init_world(struct simbench *b, const struct world_spec *spec)
 {
     static const struct axis_ops axis_ops = {
         simbench_axis_identify, simbench_axis_status, simbench_axis_move,
@@ -441,23 +446,29 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
                                                      .condition = simbench_detector_condition,
                                                      .reopen = simbench_detector_reopen,
                                                      .free = simbench_detector_free};
-    struct world_spec spec;
     *b = (struct simbench){
         .laser = {&laser_ops}, .detector = {&detector_ops}, .gone_for_ns = CLK_S(3)};
     clk_virtual_init(&b->clk, CLK_S(1), CLK_S(1700000000));
+    world_init(&b->world, spec, b->clk.t_ns);
+    for (int i = 0; i < WORLD_AXES; i++)
+        b->axis[i] = (struct simbench_axis){
+            .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
+}
+
+// The same of the defaults, changed through tune (may be NULL).
+static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
+{
+    struct world_spec spec;
     world_defaults(&spec);
     if (tune)
         tune(&spec);
-    world_init(&b->world, &spec, b->clk.t_ns);
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
-        b->axis[i] = (struct simbench_axis){
-            .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
+    simbench_init_world(b, &spec);
 }
 
 static inline struct instrument_parts simbench_parts(struct simbench *b)
 {
     struct instrument_parts parts = {.laser = &b->laser, .detector = &b->detector};
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < world_axes(&b->world.spec); i++)
         parts.axis[i] = &b->axis[i].axis;
     return parts;
 }

@@ -15,7 +15,8 @@ static inline void simconfig_axis(struct bench_axis *a, const char *name, const 
                              .speed = 20,
                              .acceleration = 60,
                              .backlash = 0.02,
-                             .deadband = 0.003};
+                             .deadband = 0.003,
+                             .retries = 2};
     snprintf(a->name, sizeof a->name, "%s", name);
     snprintf(a->unit_name, sizeof a->unit_name, "%s", unit);
 }

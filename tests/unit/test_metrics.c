@@ -14,6 +14,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { PART_THETA_I, PART_THETA_R, PART_SAMPLE }; // the axes of this bench, in its order
+
 #define BUS "modbus-rtu:/dev/bus?baud=115200&parity=E"
 
 static void part(struct instrument_snapshot *s, int i, const char *name, const char *address,
