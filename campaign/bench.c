@@ -87,7 +87,7 @@ static const struct cfg_row axis_rows[] = {
 static const struct cfg_row laser_rows[] = {
     CHOICE(bench_config, "driver", laser.driver, bench_laser_drivers, NULL, "The kind of laser."),
     TEXT(bench_config, "link", laser.link, NULL,
-         "\"serial:/dev/ttyUSB1?baud=115200\" or \"tcp:host:port\"."),
+         "\"serial:/dev/ttyUSB1?baud=115200\", \"tcp:host:port\" or \"usbtmc:vid:pid:serial\"."),
     REAL(bench_config, "power_w", laser.power_w, "W", 1e-6, 100, NULL, "The set-point."),
     REAL(bench_config, "warmup_s", laser.warmup_s, "s", 0, 14400, NULL,
          "From emission to a steady beam."),
@@ -100,7 +100,7 @@ static const struct cfg_row detector_rows[] = {
     CHOICE(bench_config, "driver", detector.driver, bench_detector_drivers, NULL,
            "The kind of detector."),
     TEXT(bench_config, "link", detector.link, NULL,
-         "\"serial:/dev/ttyUSB2?baud=19200\" or \"tcp:host:port\"."),
+         "\"serial:/dev/ttyUSB2?baud=19200\", \"tcp:host:port\" or \"usbtmc:vid:pid:serial\"."),
     REAL(bench_config, "time_constant_s", detector.time_constant_s, "s", 1e-5, 300, NULL,
          "Of its filter."),
     WHOLE(bench_config, "slope_db", detector.slope_db, "dB", 6, 24, "24",
@@ -170,6 +170,13 @@ static int complain(struct cfg_file *f, const char *list, int index, const char 
 static bool begins(const char *text, const char *a, const char *b)
 {
     return !strncmp(text, a, strlen(a)) || !strncmp(text, b, strlen(b));
+}
+
+static int check_text_link(struct cfg_file *f, const char *path, const char *link)
+{
+    if (begins(link, "serial:", "tcp:") || begins(link, "usbtmc:", "usbtmc:"))
+        return 0;
+    return cfg_complain(f, path, "allowed serial:PORT, tcp:HOST:PORT or usbtmc:VID:PID:SERIAL");
 }
 
 static int check_bus(struct cfg_file *f, const struct bench_config *b, int i)
@@ -263,10 +270,8 @@ static int check(struct cfg_file *f, const struct bench_config *b)
     if (!bench_find_station(b, "beam"))
         mistakes += cfg_complain(
             f, "stations", "station 'beam' is missing: where the detector looks into the beam");
-    if (!begins(b->laser.link, "serial:", "tcp:"))
-        mistakes += cfg_complain(f, "laser.link", "allowed serial:PORT or tcp:HOST:PORT");
-    if (!begins(b->detector.link, "serial:", "tcp:"))
-        mistakes += cfg_complain(f, "detector.link", "allowed serial:PORT or tcp:HOST:PORT");
+    mistakes += check_text_link(f, "laser.link", b->laser.link);
+    mistakes += check_text_link(f, "detector.link", b->detector.link);
     if (b->detector.slope_db % 6)
         mistakes += cfg_complain(f, "detector.slope_db", "allowed 6, 12, 18, 24 dB");
     return mistakes;
