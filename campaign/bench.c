@@ -102,7 +102,7 @@ static const struct cfg_row axis_rows[] = {
 static const struct cfg_row laser_rows[] = {
     CHOICE(bench_config, "driver", laser.driver, bench_laser_drivers, NULL, "The kind of laser."),
     TEXT(bench_config, "link", laser.link, NULL,
-         "\"serial:/dev/ttyUSB1?baud=115200\" or \"tcp:host:port\"."),
+         "\"serial:/dev/ttyUSB1?baud=115200\", \"tcp:host:port\" or \"usbtmc:vid:pid:serial\"."),
     REAL(bench_config, "power_w", laser.power_w, "W", 1e-6, 100, NULL, "The set-point."),
     REAL(bench_config, "warmup_s", laser.warmup_s, "s", 0, 14400, NULL,
          "From emission to a steady beam."),
@@ -115,7 +115,7 @@ static const struct cfg_row detector_rows[] = {
     CHOICE(bench_config, "driver", detector.driver, bench_detector_drivers, NULL,
            "The kind of detector."),
     TEXT(bench_config, "link", detector.link, NULL,
-         "\"serial:/dev/ttyUSB2?baud=19200\" or \"tcp:host:port\"."),
+         "\"serial:/dev/ttyUSB2?baud=19200\", \"tcp:host:port\" or \"usbtmc:vid:pid:serial\"."),
     REAL(bench_config, "time_constant_s", detector.time_constant_s, "s", 1e-5, 300, NULL,
          "Of its filter."),
     WHOLE(bench_config, "slope_db", detector.slope_db, "dB", 6, 24, "24",

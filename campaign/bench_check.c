@@ -30,6 +30,13 @@ static bool begins(const char *text, const char *a, const char *b)
     return !strncmp(text, a, strlen(a)) || !strncmp(text, b, strlen(b));
 }
 
+static int check_text_link(struct cfg_file *f, const char *path, const char *link)
+{
+    if (begins(link, "serial:", "tcp:") || begins(link, "usbtmc:", "usbtmc:"))
+        return 0;
+    return cfg_complain(f, path, "allowed serial:PORT, tcp:HOST:PORT or usbtmc:VID:PID:SERIAL");
+}
+
 static int check_bus(struct cfg_file *f, const struct bench_config *b, int i)
 {
     int mistakes = 0;
@@ -284,10 +291,8 @@ static int check_station(struct cfg_file *f, const struct bench_config *b,
 static int check_links(struct cfg_file *f, const struct bench_config *b)
 {
     int mistakes = 0;
-    if (!begins(b->laser.link, "serial:", "tcp:"))
-        mistakes += cfg_complain(f, "laser.link", "allowed serial:PORT or tcp:HOST:PORT");
-    if (!begins(b->detector.link, "serial:", "tcp:"))
-        mistakes += cfg_complain(f, "detector.link", "allowed serial:PORT or tcp:HOST:PORT");
+    mistakes += check_text_link(f, "laser.link", b->laser.link);
+    mistakes += check_text_link(f, "detector.link", b->detector.link);
     if (b->detector.slope_db % 6)
         mistakes += cfg_complain(f, "detector.slope_db", "allowed 6, 12, 18, 24 dB");
     return mistakes;

@@ -35,7 +35,7 @@ struct request {
 // baud).
 static int64_t silent_gap_ns(const struct link *l)
 {
-    if (!l->serial)
+    if (l->kind != LINK_SERIAL)
         return 0;
     const int64_t gap_ns = (int64_t)(3.5 * 11 * 1e9 / l->baud);
     return gap_ns > GAP_LEAST_NS ? gap_ns : GAP_LEAST_NS;
@@ -57,7 +57,7 @@ int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
         return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
     *b = (struct bus){.clk = clk,
                       .cancel = cancel,
-                      .rtu = l.serial,
+                      .rtu = l.kind == LINK_SERIAL,
                       .timeout_ms = timeout_ms,
                       .quiet_ms = quiet_ms,
                       .gap_ns = silent_gap_ns(&l),

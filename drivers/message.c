@@ -125,10 +125,15 @@ static int wait_gap(struct message *m, struct gon_error *err)
 
 // --- one question --------------------------------------------------------------------------------
 
+// Where the line ends: at its terminator; where the device says when its message is over, not
+// before that, and then without one too.
 static char *find_end(struct message *m)
 {
+    if (transport_framed(m->t) && !transport_ended(m->t))
+        return NULL;
     size_t length = strlen(m->format->end_in);
-    return m->have < length ? NULL : memmem(m->in, m->have, m->format->end_in, length);
+    char *end = m->have < length ? NULL : memmem(m->in, m->have, m->format->end_in, length);
+    return !end && transport_framed(m->t) ? m->in + m->have : end;
 }
 
 // Fills m->in until a line is complete; its length.
@@ -141,6 +146,11 @@ static int take_line(struct message *m, const char *command, struct gon_error *e
         if (m->have == sizeof m->in)
             return garbled(m, command, "4096 bytes without an end", 40, err);
         int rc = transport_read(m->t, m->in + m->have, sizeof m->in - m->have, deadline_ns, err);
+        if (rc == GON_E_LINK && clk_now_ns(transport_clk(m->t)) < deadline_ns) {
+            message_out_of_step(m, "the link says what was wrong");
+            gon_prefix(err, "'%s'", command);
+            return rc;
+        }
         if (rc == GON_E_LINK && m->have > 0)
             return garbled(m, command, "the answer breaks off", m->have, err);
         if (rc == GON_E_LINK) {

@@ -58,12 +58,12 @@ def wait_for(true, patience_s=PATIENCE_S):
 class Program:
     """A program whose standard output is read line by line; standard error goes to a file."""
 
-    def __init__(self, argv, log, env=None):
+    def __init__(self, argv, log, env=None, stdin=None):
         self.log = pathlib.Path(log)
         self.argv = [str(a) for a in argv]
         with open(self.log, "ab") as err:
-            self.process = subprocess.Popen(self.argv, stdout=subprocess.PIPE, stderr=err, text=True,
-                                            env={**os.environ, **(env or {})})
+            self.process = subprocess.Popen(self.argv, stdin=stdin, stdout=subprocess.PIPE, stderr=err,
+                                            text=True, env={**os.environ, **(env or {})})
         self.pid = self.process.pid
         self.lines = queue.Queue()
         self.said = []

@@ -156,7 +156,9 @@ static void a_benchs_mistakes_name_their_lines(void **state)
                     "looks into the beam\n");
     bench_complains(
         "serial:/dev/ttyUSB1", "/dev/ttyUSB1",
-        "b.cfg:9: laser.link = \"/dev/ttyUSB1\": allowed serial:PORT or tcp:HOST:PORT\n");
+        "b.cfg:9: laser.link = \"/dev/ttyUSB1\": allowed serial:PORT, tcp:HOST:PORT or "
+        "usbtmc:VID:PID:SERIAL\n");
+    bench_complains("serial:/dev/ttyUSB1", "usbtmc:1313:8072:P0001234", "");
     bench_complains("modbus-rtu:", "rtu:",
                     "b.cfg:3: buses[0].link = \"rtu:/dev/ttyUSB0?baud=115200&parity=E\": allowed "
                     "modbus-rtu:PORT or "

@@ -163,7 +163,7 @@ static void a_snapshot_tells_what_the_links_have_seen(void **state)
     s->b.fail_code = GON_E_LINK;
     instrument_tend(s->in);
     instrument_snapshot(s->in, &s->now);
-    for (int i = 0; i < INSTRUMENT_AXES; i++) {
+    for (int i = 0; i < instrument_bench(s->in)->axes_count; i++) {
         assert_string_equal(s->now.part[i].driver, "oriental-az");
         assert_int_equal(s->now.part[i].stats.errors[LINK_GARBLED], 2);
         assert_int_equal(link_stats_answers(&s->now.part[i].stats), 1);

@@ -32,6 +32,8 @@ static void part(struct instrument_snapshot *s, int i, const char *name, const c
 static struct instrument_snapshot bench(void)
 {
     struct instrument_snapshot s = {.signal_v = 0.25, .monitor_v = (double)NAN};
+    for (int i = 0; i < INSTRUMENT_AXES; i++)
+        part(&s, i, "", "", PART_ABSENT);
     part(&s, PART_THETA_I, "theta_i", BUS, PART_LOST);
     part(&s, PART_THETA_R, "theta_r", BUS, PART_OK);
     part(&s, PART_SAMPLE, "sample", "", PART_ABSENT);
