@@ -37,7 +37,7 @@ USES_goniod   := daemon campaign drivers fit model base
 USES_gonio    := cli campaign drivers fit model base
 USES_goniosim := sim drivers model base
 LIBS_base     := -lconfig
-LIBS_drivers  := -lmodbus -lserialport
+LIBS_drivers  := -lmodbus -lserialport -lusb-1.0
 LIBS_campaign := -lsqlite3 -ljansson
 LIBS_sim      := -ljansson
 LIBS_daemon   := -lmicrohttpd -ljansson
@@ -129,10 +129,26 @@ $(SHIM): tests/shim/ptycompat.c
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS) -std=c17 $(WARN) -O1 -g -fPIC -shared -o $@ $< -ldl
 
+# tests/usb: a USB device under umockdev, and a program that asks over a link. '// with:' names further parts.
+USB_PROGRAMS := linkask $(if $(wildcard /usr/include/umockdev-1.0/umockdev.h),usbsim)
+UMOCKDEV     := $(if $(filter usbsim,$(USB_PROGRAMS)),$(shell pkg-config --cflags umockdev-1.0 | sed 's/-I/-isystem /g'))
+usb_named = $(shell sed -n 's,^// $(2): *,,p' tests/usb/$(1).c)
+usb_parts = $(patsubst %,$(B)/obj/tests/usb/%.o,$(1) $(call usb_named,$(1),with))
+define usb_rules
+OBJECTS += $(call usb_parts,$(1))
+$(B)/tests/$(1): $(call usb_parts,$(1)) $(patsubst %,$(B)/lib%.a,$(call usb_named,$(1),uses))
+	$$(call say,LINK,$$@)
+	$(Q)mkdir -p $$(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $$@ $$^ $(call libs_of,$(call usb_named,$(1),uses)) \
+	    $(if $(filter usbsim,$(1)),-lumockdev -lgobject-2.0 -lglib-2.0)
+endef
+$(foreach u,$(USB_PROGRAMS),$(eval $(call usb_rules,$(u))))
+$(B)/obj/tests/usb/usbserver.o: CPPFLAGS += $(UMOCKDEV)
+
 unit: $(UNIT_TESTS:%=$(B)/tests/%)
 	$(Q)scripts/unit $(B)/tests $(UNIT_TESTS)
 
-system: all $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
+system: all $(USB_PROGRAMS:%=$(B)/tests/%) $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
 	$(Q)GONIO_BUILD=$(abspath $(B)) scripts/system $(ARGS)
 
 # Parallel on its own unless the caller chose a number of jobs.

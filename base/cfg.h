@@ -24,8 +24,10 @@ enum cfg_type {
     CFG_CHOICE, // int: index into choices
     CFG_REALS,  // double[size], count at count_offset; [ ] or ( ) in the file, a single number is a
                 // list of one
+    CFG_CHOICES, // int[size], count at count_offset: the same of choices
     CFG_STRINGS, // char[size][stride], count at count_offset; control characters may be in them; a
                  // single text is a list of one
+    CFG_PAIRS,   // double[size][2], count at count_offset; ( (a, b), (a, b) ) in the file
     CFG_GROUP,  // nested struct: { }
     CFG_GROUPS  // array of structs: ( { }, { } )
 };
@@ -39,7 +41,7 @@ struct cfg_row {
     double min, max;      // inclusive; numbers and lists of them; equal: any
     const char *fallback; // default, as written in a file; NULL: must be given; groups: "" or NULL
     const char *help;     // one sentence
-    const char *const *choices; // CFG_CHOICE, NULL at its end
+    const char *const *choices; // CFG_CHOICE and CFG_CHOICES, NULL at its end
     const struct cfg_row *rows; // CFG_GROUP, CFG_GROUPS; a row without name ends a table
     size_t stride;              // CFG_GROUPS, CFG_STRINGS: sizeof one element
     size_t count_offset;        // lists: of the int that gets the count

@@ -23,8 +23,11 @@ static const char *kind(const struct cfg_row *row)
         return "true or false";
     case CFG_CHOICE:
         return "one of";
+    case CFG_CHOICES:
+        return "one or a list of";
     case CFG_REALS:
         return "list of numbers";
+    case CFG_PAIRS: return "list of pairs of numbers";
     case CFG_GROUP:
         return "group";
     case CFG_GROUPS:
@@ -36,7 +39,8 @@ static const char *kind(const struct cfg_row *row)
 static void range(FILE *out, const struct cfg_row *row)
 {
     bool whole = row->type == CFG_INT || row->type == CFG_HEX;
-    bool number = whole || row->type == CFG_REAL || row->type == CFG_REALS;
+    bool number = whole || row->type == CFG_REAL || row->type == CFG_REALS ||
+                  row->type == CFG_PAIRS;
     int digits = whole ? 17 : 9; // whole numbers to the last digit
     if (!number || row->min == row->max)
         return;
@@ -72,7 +76,7 @@ static void describe(FILE *out, const char *path, const struct cfg_row *row)
         char name[240];
         snprintf(name, sizeof name, "%.150s%s%.80s", path, *path ? "." : "", row->name);
         fprintf(out, "*%s*: %s", name, kind(row));
-        for (int i = 0; row->type == CFG_CHOICE && row->choices[i]; i++)
+        for (int i = 0; row->choices && row->choices[i]; i++)
             fprintf(out, "%s \"%s\"", i ? "," : "", row->choices[i]);
         if (row->unit)
             fprintf(out, ", %s", row->unit);

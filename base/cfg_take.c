@@ -152,6 +152,38 @@ static int take_reals(const struct place *at, const config_setting_t *s, const s
     return mistakes;
 }
 
+static int take_pairs(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+{
+    if (!config_setting_is_list(s))
+        return wrong(at, s, "not a list of pairs; write ( (a, b), (a, b) )");
+    int count = config_setting_length(s), mistakes = 0;
+    double *values = member(at, row->offset);
+    if ((size_t)count > row->size)
+        return wrong(at, s, "%d pairs; at most %zu are allowed", count, row->size);
+    if (count == 0 && !row->fallback)
+        return wrong(at, s, "an empty list; give at least one pair");
+    for (int i = 0; i < count; i++) {
+        const config_setting_t *pair = config_setting_get_elem(s, (unsigned)i);
+        const struct place element = inner(at, NULL, i, NULL);
+        const bool list = config_setting_is_list(pair) || config_setting_is_array(pair);
+        if (!list || config_setting_length(pair) != 2) {
+            mistakes += wrong(&element, pair, "not a pair of numbers; write (a, b)");
+            continue;
+        }
+        for (int k = 0; k < 2; k++) {
+            const struct place number = inner(&element, NULL, k, NULL);
+            double value = (double)NAN;
+            mistakes +=
+                take_number(&number, config_setting_get_elem(pair, (unsigned)k), row, &value);
+            if (values)
+                values[2 * i + k] = value;
+        }
+    }
+    if (at->target)
+        *(int *)member(at, row->count_offset) = count;
+    return mistakes;
+}
+
 // --- words ---------------------------------------------------------------------------------------
 
 // Length of the UTF-8 sequence at p, 0 when it is none. No overlong forms, no surrogates.
@@ -220,15 +252,16 @@ static int take_strings(const struct place *at, const config_setting_t *s,
     return mistakes;
 }
 
-static int take_choice(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+// ret_index gets the word's index; nothing when it is a mistake.
+static int take_word(const struct place *at, const config_setting_t *s, const struct cfg_row *row,
+                     int *ret_index)
 {
     char list[200] = "";
     const char *text =
         config_setting_type(s) == CONFIG_TYPE_STRING ? config_setting_get_string(s) : NULL;
     for (int i = 0; row->choices[i]; i++) {
         if (text && !strcmp(text, row->choices[i])) {
-            if (at->target)
-                *(int *)member(at, row->offset) = i;
+            *ret_index = i;
             return 0;
         }
         size_t used = strlen(list);
@@ -237,6 +270,37 @@ static int take_choice(const struct place *at, const config_setting_t *s, const 
     const char *meant = text ? options_suggest(text, row->choices) : NULL;
     return wrong(at, s, "%s; allowed %s%s%s%s", text ? "unknown" : "not a text in double quotes",
                  list, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+static int take_choice(const struct place *at, const config_setting_t *s, const struct cfg_row *row)
+{
+    int index = 0, mistakes = take_word(at, s, row, &index);
+    if (at->target)
+        *(int *)member(at, row->offset) = index;
+    return mistakes;
+}
+
+static int take_choices(const struct place *at, const config_setting_t *s,
+                        const struct cfg_row *row)
+{
+    const bool list = config_setting_is_array(s) || config_setting_is_list(s);
+    const int count = list ? config_setting_length(s) : 1;
+    int *indices = member(at, row->offset), mistakes = 0;
+    if ((size_t)count > row->size)
+        return wrong(at, s, "%d words; at most %zu are allowed", count, row->size);
+    if (count == 0)
+        return wrong(at, s, "an empty list; give at least one word");
+    for (int i = 0; i < count; i++) {
+        const struct place element = inner(at, NULL, i, NULL);
+        int index = 0;
+        mistakes += take_word(list ? &element : at,
+                              list ? config_setting_get_elem(s, (unsigned)i) : s, row, &index);
+        if (indices)
+            indices[i] = index;
+    }
+    if (at->target)
+        *(int *)member(at, row->count_offset) = count;
+    return mistakes;
 }
 
 // --- one row -------------------------------------------------------------------------------------
@@ -277,8 +341,11 @@ static int take_row(const struct place *at, const config_setting_t *s, const str
         return take_strings(at, s, row);
     case CFG_CHOICE:
         return take_choice(at, s, row);
+    case CFG_CHOICES:
+        return take_choices(at, s, row);
     case CFG_REALS:
         return take_reals(at, s, row);
+    case CFG_PAIRS: return take_pairs(at, s, row);
     case CFG_GROUPS:
         return take_groups(at, s, row);
     case CFG_INT:
@@ -314,7 +381,7 @@ static void fall_back_word(const struct place *at, const struct cfg_row *row, co
     bool quoted = length >= 2 && text[0] == '"' && text[length - 1] == '"';
     snprintf(word, sizeof word, "%.*s", (int)(quoted ? length - 2 : length),
              quoted ? text + 1 : text);
-    if (row->type != CFG_CHOICE) {
+    if (!row->choices) {
         strncpy(member(at, row->offset), word, row->size);
         return;
     }
@@ -363,6 +430,10 @@ static void fall_back(const struct place *at, const struct cfg_row *row)
     case CFG_CHOICE:
         fall_back_word(at, row, *text ? text : row->choices[0]);
         break;
+    case CFG_CHOICES:
+        fall_back_word(at, row, *text ? text : row->choices[0]);
+        *(int *)member(at, row->count_offset) = 1;
+        break;
     case CFG_INT:
     case CFG_HEX:
     case CFG_REAL:
@@ -374,6 +445,7 @@ static void fall_back(const struct place *at, const struct cfg_row *row)
     case CFG_REALS:
         fall_back_reals(at, row, text);
         break;
+    case CFG_PAIRS:
     case CFG_GROUPS:
     case CFG_STRINGS:
         *(int *)member(at, row->count_offset) = 0;

@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "campaign/bench.h"
 
-#include "base/options.h"
-#include "base/units.h"
+#include "campaign/bench_check.h"
 
-#include <limits.h>
-#include <math.h>
-#include <stdarg.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const char *const regimes[] = {"underfilled", "overfilled", NULL};
-static const char *const axis_names[] = {"theta_i", "theta_r", "sample", NULL};
+static const char *const approaches[] = {"from-below", "from-above", NULL};
 
 #define TEXT(s, n, member, def, text)                                                              \
     {                                                                                              \
@@ -61,33 +56,53 @@ static const struct cfg_row bus_rows[] = {
     {0}};
 
 static const struct cfg_row axis_rows[] = {
-    TEXT(bench_axis, "name", name, NULL, "\"theta_i\", \"theta_r\" or \"sample\"."),
+    TEXT(bench_axis, "name", name, NULL,
+         "Free; \"theta_i\" and \"theta_r\" are the angles unless kinematics says otherwise, "
+         "\"sample\" moves the sample out of the beam."),
     TEXT(bench_axis, "driver", driver, NULL,
          "The controller's profile: its name (\"oriental-az\") or a path with a slash in it."),
     TEXT(bench_axis, "bus", bus, NULL, "The name of one of the buses."),
     WHOLE(bench_axis, "unit", unit, NULL, 1, 247, NULL, "The controller's address on its bus."),
     TEXT(bench_axis, "unit_name", unit_name, "\"deg\"",
-         "What its positions are in: deg, for the sample mm."),
+         "What its positions are in: deg or mm; of the sample mm."),
     REAL(bench_axis, "steps_per_unit", steps_per_unit, NULL, -1e7, 1e7, NULL,
          "Motor steps a degree or millimetre; negative turns the direction round."),
+    REAL(bench_axis, "encoder_steps", encoder_steps, NULL, 1e-6, 1e6, "1",
+         "Steps that the encoder counts while the motor makes one."),
     REAL(bench_axis, "min", min, NULL, -1e4, 1e4, NULL,
          "The lowest position that is ever commanded."),
     REAL(bench_axis, "max", max, NULL, -1e4, 1e4, NULL, "The highest."),
+    {.name = "sweep",
+     .type = CFG_REALS,
+     .offset = offsetof(struct bench_axis, sweep),
+     .size = 2,
+     .count_offset = offsetof(struct bench_axis, sweep_count),
+     .min = -1e4,
+     .max = 1e4,
+     .fallback = "",
+     .help = "Lowest and highest position of a sweep, within min and max, which they are if left "
+             "out; stations may stand outside."},
     REAL(bench_axis, "speed", speed, NULL, 1e-3, 1e4, NULL, "Units a second."),
     REAL(bench_axis, "acceleration", acceleration, NULL, 1e-3, 1e6, NULL,
          "Units a second, each second."),
     REAL(bench_axis, "backlash", backlash, NULL, 0, 10, "0",
-         "Play of the drive: positions are approached from below by this."),
+         "Play of the drive: positions are approached from one side by this."),
+    CHOICE(bench_axis, "approach", approach, approaches, "\"from-below\"",
+           "The side from which they are approached."),
     REAL(bench_axis, "deadband", deadband, NULL, 0, 10, NULL, "A position is reached within this."),
+    WHOLE(bench_axis, "retries", retries, NULL, 0, 20, "2",
+          "Further tries when it comes to stand outside the deadband; then the run pauses."),
+    REAL(bench_axis, "following_error", following_error, NULL, 0, 1e4, "0",
+         "The most that it may be off its predicted way while it moves; 0: any."),
     REAL(bench_axis, "zero", zero, NULL, -1e4, 1e4, "0",
-         "The position at the controller's step 0."),
+         "The position at the controller's step 0: position = steps / steps_per_unit + zero."),
     {0}};
 
 static const struct cfg_row laser_rows[] = {
     TEXT(bench_config, "driver", laser.driver, NULL,
          "The laser's profile: its name (\"cobolt-05\") or a path with a slash in it."),
     TEXT(bench_config, "link", laser.link, NULL,
-         "\"serial:/dev/ttyUSB1?baud=115200\" or \"tcp:host:port\"."),
+         "\"serial:/dev/ttyUSB1?baud=115200\", \"tcp:host:port\" or \"usbtmc:vid:pid:serial\"."),
     REAL(bench_config, "power_w", laser.power_w, "W", 1e-6, 100, NULL, "The set-point."),
     REAL(bench_config, "warmup_s", laser.warmup_s, "s", 0, 14400, NULL,
          "From emission to a steady beam."),
@@ -100,7 +115,7 @@ static const struct cfg_row detector_rows[] = {
     TEXT(bench_config, "driver", detector.driver, NULL,
          "The detector's profile: its name (\"sr830\") or a path with a slash in it."),
     TEXT(bench_config, "link", detector.link, NULL,
-         "\"serial:/dev/ttyUSB2?baud=19200\" or \"tcp:host:port\"."),
+         "\"serial:/dev/ttyUSB2?baud=19200\", \"tcp:host:port\" or \"usbtmc:vid:pid:serial\"."),
     REAL(bench_config, "time_constant_s", detector.time_constant_s, "s", 1e-5, 300, NULL,
          "Of its filter."),
     WHOLE(bench_config, "slope_db", detector.slope_db, "dB", 6, 24, "24",
@@ -111,15 +126,53 @@ static const struct cfg_row detector_rows[] = {
          "Standard uncertainty of the ratio of a small signal to the beam's, relative."),
     {0}};
 
+static const struct cfg_row mark_rows[] = {
+    TEXT(bench_mark, "name", name, NULL, "The name of one of the axes."),
+    REAL(bench_mark, "at", at, NULL, -1e4, 1e4, NULL, "Where it stands, in its units."),
+    {0}};
+
 static const struct cfg_row station_rows[] = {
     TEXT(bench_station, "name", name, NULL,
          "\"beam\" is where the detector looks into the beam; others are free."),
-    REAL(bench_station, "theta_i_deg", theta_i_deg, "deg", -360, 360, NULL,
-         "Where theta_i stands."),
-    REAL(bench_station, "theta_r_deg", theta_r_deg, "deg", -360, 360, NULL,
-         "Where theta_r stands."),
+    REAL(bench_station, "theta_i_deg", theta_i_deg, "deg", -360, 360, NULL, "Its theta_i."),
+    REAL(bench_station, "theta_r_deg", theta_r_deg, "deg", -360, 360, NULL, "Its theta_r."),
     REAL(bench_station, "sample_mm", sample_mm, "mm", -1e4, 1e4, "0",
          "Where the sample stands, if that moves."),
+    {.name = "axes",
+     .type = CFG_GROUPS,
+     .offset = offsetof(struct bench_station, marks),
+     .size = BENCH_AXES,
+     .stride = sizeof(struct bench_mark),
+     .count_offset = offsetof(struct bench_station, marks_count),
+     .fallback = "",
+     .rows = mark_rows,
+     .help = "Where single axes stand, before what follows from the angles."},
+    {0}};
+
+static const struct cfg_row keep_out_rows[] = {
+    TEXT(bench_keep_out, "name", name, NULL, "What is in the way."),
+    {.name = "polygon",
+     .type = CFG_PAIRS,
+     .offset = offsetof(struct bench_keep_out, vertex),
+     .size = BENCH_VERTICES,
+     .count_offset = offsetof(struct bench_keep_out, vertices),
+     .unit = "deg",
+     .min = -360,
+     .max = 360,
+     .help = "Its corners ( (theta_i, theta_r), ... ), at least three; a tenth of a degree around "
+             "it is kept clear too."},
+    {0}};
+
+#define COEFFICIENT(n) REAL(bench_row, #n, n, NULL, -1e3, 1e3, "0", "Its share in the position.")
+
+static const struct cfg_row row_rows[] = {
+    TEXT(bench_row, "axis", axis, NULL, "The name of one of the axes."),
+    COEFFICIENT(theta_i),
+    COEFFICIENT(theta_r),
+    COEFFICIENT(phi),
+    COEFFICIENT(polariser),
+    COEFFICIENT(analyser),
+    REAL(bench_row, "offset", offset, "deg", -1e4, 1e4, "0", "Added to their sum."),
     {0}};
 
 static const struct cfg_row daemon_rows[] = {
@@ -127,150 +180,65 @@ static const struct cfg_row daemon_rows[] = {
          "Where campaign files go; goniod(8), FILES, says what goes before it and where otherwise."),
     {0}};
 
-#define MANY(n, member, most, element, table, text)                                                \
+#define MANY(n, member, most, element, table, def, text)                                           \
     {                                                                                              \
         .name = n, .type = CFG_GROUPS, .offset = offsetof(struct bench_config, member),            \
         .size = most, .stride = sizeof(struct element),                                            \
-        .count_offset = offsetof(struct bench_config, member##_count), .rows = table, .help = text \
+        .count_offset = offsetof(struct bench_config, member##_count), .rows = table,              \
+        .fallback = def, .help = text                                                              \
     }
 #define GROUP(n, table, def, text)                                                                 \
     {                                                                                              \
         .name = n, .type = CFG_GROUP, .rows = table, .fallback = def, .help = text                 \
     }
 
+static const struct cfg_row kinematics_rows[] = {
+    CHOICE(bench_config, "kind", kinematics.kind, kinematics_kinds, "\"linear\"",
+           "How angles become positions: by a matrix, or with a sample that tilts two ways."),
+    {.name = "rows",
+     .type = CFG_GROUPS,
+     .offset = offsetof(struct bench_config, kinematics.rows),
+     .size = KINEMATICS_COORDINATES,
+     .stride = sizeof(struct bench_row),
+     .count_offset = offsetof(struct bench_config, kinematics.rows_count),
+     .fallback = "",
+     .rows = row_rows,
+     .help = "Of linear: an axis each, position = sum of coefficients times angles, plus offset."},
+    TEXT(bench_config, "tilt", kinematics.tilt, "\"tilt\"",
+         "Of spherical: the axis that tilts the sample's normal away from the beam."),
+    TEXT(bench_config, "azimuth", kinematics.azimuth, "\"azimuth\"",
+         "The axis that turns the tilt about the beam."),
+    TEXT(bench_config, "arm", kinematics.arm, "\"arm\"",
+         "The axis that turns the detector away from the source's direction."),
+    TEXT(bench_config, "polariser", kinematics.polariser, "",
+         "The axis of the polariser before the sample, if one turns it."),
+    TEXT(bench_config, "analyser", kinematics.analyser, "",
+         "The axis of the analyser on the arm, if one turns it."),
+    {0}};
+
 const struct cfg_row bench_config_schema[] = {
     GROUP("bench", bench_rows, NULL, "Geometry."),
-    MANY("buses", buses, BENCH_BUSES, bench_bus, bus_rows, "What the axes are wired to."),
-    MANY("axes", axes, BENCH_AXES, bench_axis, axis_rows,
-         "theta_i and theta_r; sample if a motor moves it out of the beam."),
+    MANY("buses", buses, BENCH_BUSES, bench_bus, bus_rows, NULL, "What the axes are wired to."),
+    MANY("axes", axes, BENCH_AXES, bench_axis, axis_rows, NULL,
+         "theta_i and theta_r, or those that kinematics makes them of; sample if a motor moves it "
+         "out of the beam; any others."),
+    GROUP(
+        "kinematics", kinematics_rows, "",
+        "How the angles follow from the axes; left out, theta_i and theta_r are axes themselves."),
+    MANY("keep_out", keep_out, BENCH_KEEP_OUTS, bench_keep_out, keep_out_rows, "",
+         "Where the axes must not go, not even in passing."),
     GROUP("laser", laser_rows, NULL, "The laser."),
     GROUP("detector", detector_rows, NULL, "The detector chain."),
-    MANY("stations", stations, BENCH_STATIONS, bench_station, station_rows,
+    {.name = "polarisation",
+     .type = CFG_GROUP,
+     .offset = offsetof(struct bench_config, polarisation),
+     .rows = bench_polarisation_rows,
+     .fallback = "",
+     .help = "States of polarisation that elements on axes make; none: nothing moves for them."},
+    MANY("stations", stations, BENCH_STATIONS, bench_station, station_rows, NULL,
          "Named positions; beam must be one."),
     GROUP("daemon", daemon_rows, "", "Of goniod itself."),
     {0}};
-
-// --- checks across settings ----------------------------------------------------------------------
-
-static int complain(struct cfg_file *f, const char *list, int index, const char *member,
-                    const char *fmt, ...) __attribute__((format(printf, 5, 6)));
-
-static int complain(struct cfg_file *f, const char *list, int index, const char *member,
-                    const char *fmt, ...)
-{
-    char path[80], text[300];
-    va_list args;
-    snprintf(path, sizeof path, "%s[%d].%s", list, index, member);
-    va_start(args, fmt);
-    vsnprintf(text, sizeof text, fmt, args);
-    va_end(args);
-    return cfg_complain(f, path, "%s", text);
-}
-
-static bool begins(const char *text, const char *a, const char *b)
-{
-    return !strncmp(text, a, strlen(a)) || !strncmp(text, b, strlen(b));
-}
-
-static int check_bus(struct cfg_file *f, const struct bench_config *b, int i)
-{
-    int mistakes = 0;
-    if (!begins(b->buses[i].link, "modbus-rtu:", "modbus-tcp:"))
-        mistakes +=
-            complain(f, "buses", i, "link", "allowed modbus-rtu:PORT or modbus-tcp:HOST:PORT");
-    for (int j = 0; j < i; j++)
-        if (!strcmp(b->buses[i].name, b->buses[j].name))
-            mistakes += complain(f, "buses", i, "name", "is the name of buses[%d] too", j);
-    return mistakes;
-}
-
-static int check_axis_name(struct cfg_file *f, const struct bench_config *b, int i)
-{
-    const struct bench_axis *a = &b->axes[i];
-    int known = 0, mistakes = 0;
-    while (axis_names[known] && strcmp(axis_names[known], a->name))
-        known++;
-    if (!axis_names[known]) {
-        const char *meant = options_suggest(a->name, axis_names);
-        return complain(f, "axes", i, "name", "unknown; allowed theta_i, theta_r, sample%s%s%s",
-                        meant ? "; did you mean '" : "", meant ? meant : "", meant ? "'?" : "");
-    }
-    const char *unit_name = strcmp(a->name, "sample") ? "deg" : "mm";
-    if (strcmp(a->unit_name, unit_name))
-        mistakes += complain(f, "axes", i, "unit_name", "%s is in %s", a->name, unit_name);
-    for (int j = 0; j < i; j++)
-        if (!strcmp(a->name, b->axes[j].name))
-            mistakes += complain(f, "axes", i, "name", "is the name of axes[%d] too", j);
-    return mistakes;
-}
-
-static int check_axis(struct cfg_file *f, const struct bench_config *b, int i)
-{
-    const struct bench_axis *a = &b->axes[i];
-    int mistakes = check_axis_name(f, b, i), bus = 0;
-    while (bus < b->buses_count && strcmp(b->buses[bus].name, a->bus))
-        bus++;
-    if (bus == b->buses_count)
-        mistakes += complain(f, "axes", i, "bus", "no bus of that name in buses");
-    for (int j = 0; j < i; j++)
-        if (!strcmp(a->bus, b->axes[j].bus) && a->unit == b->axes[j].unit)
-            mistakes +=
-                complain(f, "axes", i, "unit", "is the unit of axes[%d] on that bus too", j);
-    if (!(a->min < a->max))
-        mistakes += complain(f, "axes", i, "min", "not below max = %.9g", a->max);
-    const double farthest = fmax(fabs(a->min - a->zero), fabs(a->max - a->zero));
-    if (a->steps_per_unit == 0 || fabs(a->steps_per_unit) * farthest > INT_MAX)
-        mistakes +=
-            complain(f, "axes", i, "steps_per_unit",
-                     "must not be 0, and max and min must be within 2147483647 steps of zero");
-    return mistakes;
-}
-
-static int check_within(struct cfg_file *f, const struct bench_config *b, int i, const char *axis,
-                        const char *member, double value)
-{
-    const struct bench_axis *a = bench_find_axis(b, axis);
-    if (!a || (value >= a->min && value <= a->max))
-        return 0;
-    return complain(f, "stations", i, member, "beyond the limits of axis %s; allowed %.9g..%.9g %s",
-                    axis, a->min, a->max, a->unit_name);
-}
-
-static int check_station(struct cfg_file *f, const struct bench_config *b, int i)
-{
-    const struct bench_station *s = &b->stations[i];
-    int mistakes = 0;
-    for (int j = 0; j < i; j++)
-        if (!strcmp(s->name, b->stations[j].name))
-            mistakes += complain(f, "stations", i, "name", "is the name of stations[%d] too", j);
-    mistakes += check_within(f, b, i, "theta_i", "theta_i_deg", s->theta_i_deg);
-    mistakes += check_within(f, b, i, "theta_r", "theta_r_deg", s->theta_r_deg);
-    return mistakes + check_within(f, b, i, "sample", "sample_mm", s->sample_mm);
-}
-
-static int check(struct cfg_file *f, const struct bench_config *b)
-{
-    int mistakes = 0;
-    for (int i = 0; i < b->buses_count; i++)
-        mistakes += check_bus(f, b, i);
-    for (int i = 0; i < b->axes_count; i++)
-        mistakes += check_axis(f, b, i);
-    for (int i = 0; i < b->stations_count; i++)
-        mistakes += check_station(f, b, i);
-    for (int i = 0; i < 2; i++)
-        if (!bench_find_axis(b, axis_names[i]))
-            mistakes += cfg_complain(f, "axes", "axis '%s' is missing", axis_names[i]);
-    if (!bench_find_station(b, "beam"))
-        mistakes += cfg_complain(
-            f, "stations", "station 'beam' is missing: where the detector looks into the beam");
-    if (!begins(b->laser.link, "serial:", "tcp:"))
-        mistakes += cfg_complain(f, "laser.link", "allowed serial:PORT or tcp:HOST:PORT");
-    if (!begins(b->detector.link, "serial:", "tcp:"))
-        mistakes += cfg_complain(f, "detector.link", "allowed serial:PORT or tcp:HOST:PORT");
-    if (b->detector.slope_db % 6)
-        mistakes += cfg_complain(f, "detector.slope_db", "allowed 6, 12, 18, 24 dB");
-    return mistakes;
-}
 
 // --- reading -------------------------------------------------------------------------------------
 
@@ -278,7 +246,7 @@ static int take(struct cfg_file *f, struct bench_config *ret_bench, char **ret_t
 {
     struct bench_config b;
     memset(&b, 0, sizeof b);
-    if (!f || cfg_take(f, bench_config_schema, &b) || check(f, &b))
+    if (!f || cfg_take(f, bench_config_schema, &b) || bench_check(f, &b))
         return GON_E_INPUT;
     if (ret_text && !(*ret_text = strdup(cfg_text(f))))
         return GON_E_SYSTEM;
@@ -311,26 +279,4 @@ int bench_config_parse(const char *text, const char *name, struct cfg_sink sink,
     int rc = take(f, ret_bench, NULL);
     cfg_close(f);
     return rc;
-}
-
-const struct bench_axis *bench_find_axis(const struct bench_config *b, const char *name)
-{
-    for (int i = 0; i < b->axes_count; i++)
-        if (!strcmp(b->axes[i].name, name))
-            return &b->axes[i];
-    return NULL;
-}
-
-const struct bench_station *bench_find_station(const struct bench_config *b, const char *name)
-{
-    for (int i = 0; i < b->stations_count; i++)
-        if (!strcmp(b->stations[i].name, name))
-            return &b->stations[i];
-    return NULL;
-}
-
-double bench_omega_sr(const struct bench_config *b)
-{
-    return UNITS_PI * (b->aperture_radius_mm / b->distance_mm) *
-           (b->aperture_radius_mm / b->distance_mm);
 }

@@ -28,6 +28,11 @@
         .name = n, .type = CFG_CHOICE, .offset = AT(member), .choices = list, .fallback = def,     \
         .help = text                                                                               \
     }
+#define CHOICES(n, member, list, def, text)                                                        \
+    {                                                                                              \
+        .name = n, .type = CFG_CHOICES, .offset = AT(member), .size = CAMPAIGN_STATES,             \
+        .count_offset = AT(member##_count), .choices = list, .fallback = def, .help = text         \
+    }
 // Groups of the file that are no structs of their own: offset 0.
 #define GROUP(n, table, def, text)                                                                 \
     {                                                                                              \
@@ -36,6 +41,7 @@
 
 static const char *const pol_in_names[] = {"u", "s", "p", "+45", "-45", "R", "L", "laser", NULL};
 static const char *const pol_out_names[] = {"u", "s", "p", "+45", "-45", "R", "L", NULL};
+static const char *const combine_names[] = {"each", "pairs", NULL};
 
 static const struct cfg_row theta_r_rows[] = {
     REAL("from_deg", from_deg, "deg", -89, 89, "-85",
@@ -96,10 +102,14 @@ static const struct cfg_row campaign_rows[] = {
     GROUP("dense", dense_rows, "", "Finer steps around the specular direction."),
     REAL("phi_deg", phi_deg, "deg", -360, 360, "0",
          "How the sample was mounted; recorded, nothing moves."),
-    CHOICE("pol_in", pol_in, pol_in_names, "\"laser\"",
-           "Polarisation on the sample; \"laser\" takes what the bench says of its laser."),
-    CHOICE("pol_out", pol_out, pol_out_names, "\"u\"",
-           "Analyser before the detector; \"u\": none."),
+    CHOICES("pol_in", pol_in, pol_in_names, "\"laser\"",
+            "Polarisation on the sample; \"laser\" takes what the bench says of its laser. Of "
+            "several every sweep is measured in each."),
+    CHOICES("pol_out", pol_out, pol_out_names, "\"u\"",
+            "Analyser before the detector; \"u\": none."),
+    CHOICE("pol_combine", pol_combine, combine_names, "\"each\"",
+           "Of lists: \"each\" pol_in with each pol_out, or \"pairs\" of the first two, the "
+           "second two and so on."),
     REAL("blind_half_deg", blind_half_deg, "deg", 0, 30, "0",
          "Skip |theta_r + theta_i| below this, where the detector stands in the beam; 0: skip "
          "nothing."),
@@ -112,9 +122,62 @@ static const struct cfg_row campaign_rows[] = {
 const struct cfg_row campaign_config_schema[] = {
     GROUP("campaign", campaign_rows, NULL, "What to measure."), {0}};
 
+int campaign_channels(const struct campaign_config *c,
+                      struct campaign_channel ret_channels[CAMPAIGN_CHANNELS])
+{
+    int n = 0;
+    for (int i = 0; i < c->pol_in_count; i++)
+        for (int k = 0; k < c->pol_out_count && n < CAMPAIGN_CHANNELS; k++)
+            if (c->pol_combine == CAMPAIGN_EACH || i == k)
+                ret_channels[n++] = (struct campaign_channel){c->pol_in[i], c->pol_out[k]};
+    return n;
+}
+
+static int check_list(struct cfg_file *f, const char *name, const int *list, int count)
+{
+    char path[40];
+    int mistakes = 0;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < i; k++)
+            if (list[i] == list[k]) {
+                snprintf(path, sizeof path, "campaign.%s[%d]", name, i);
+                mistakes += cfg_complain(f, path, "is there already; each state once");
+                break;
+            }
+    return mistakes;
+}
+
+static int check_pairs(struct cfg_file *f, const struct campaign_config *c)
+{
+    char path[40];
+    int mistakes = 0;
+    if (c->pol_in_count != c->pol_out_count)
+        return cfg_complain(f, "campaign.pol_combine",
+                            "pol_in has %d and pol_out %d; for pairs as many of each",
+                            c->pol_in_count, c->pol_out_count);
+    for (int i = 0; i < c->pol_in_count; i++)
+        for (int k = 0; k < i; k++)
+            if (c->pol_in[i] == c->pol_in[k] && c->pol_out[i] == c->pol_out[k]) {
+                snprintf(path, sizeof path, "campaign.pol_in[%d]", i);
+                mistakes += cfg_complain(f, path,
+                                         "with its pol_out is there already; each pair "
+                                         "once");
+                break;
+            }
+    return mistakes;
+}
+
+static int check_polarisation(struct cfg_file *f, const struct campaign_config *c)
+{
+    if (c->pol_combine == CAMPAIGN_PAIRS)
+        return check_pairs(f, c);
+    return check_list(f, "pol_in", c->pol_in, c->pol_in_count) +
+           check_list(f, "pol_out", c->pol_out, c->pol_out_count);
+}
+
 static int check(struct cfg_file *f, const struct campaign_config *c)
 {
-    int mistakes = 0;
+    int mistakes = check_polarisation(f, c);
     if (!(c->from_deg < c->to_deg))
         mistakes +=
             cfg_complain(f, "campaign.theta_r.from_deg", "not below to_deg = %.9g deg", c->to_deg);

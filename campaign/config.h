@@ -13,7 +13,18 @@ enum {
     CAMPAIGN_ANGLES = 100,
     CAMPAIGN_NAME = 64,
     CAMPAIGN_NOTES = 1024,
+    CAMPAIGN_STATES = 16,                            // in a list
+    CAMPAIGN_CHANNELS = (POL_KNOWN + 1) * POL_KNOWN, // all there can be
     POL_IN_LASER = POL_UNKNOWN
+};
+
+enum campaign_combine {
+    CAMPAIGN_EACH, // every pol_in with every pol_out, pol_in by pol_in
+    CAMPAIGN_PAIRS // the first with the first, the second with the second, ...
+};
+
+struct campaign_channel { // as pol_in and pol_out of the configuration
+    int in, out;
 };
 
 struct campaign_config {
@@ -23,10 +34,13 @@ struct campaign_config {
     int theta_i_count;
     double from_deg, to_deg, step_deg; // theta_r, signed
     double dense_half_width_deg, dense_step_deg,
-        dense_weight;      // |theta_r - theta_i| <= half width, edges included
-    double phi_deg;        // how the sample was mounted: recorded, nothing moves
-    int pol_in;            // enum polarisation, or POL_IN_LASER: what the bench says of its laser
-    int pol_out;           // analyser before the detector; POL_U: none
+        dense_weight; // |theta_r - theta_i| <= half width, edges included
+    double phi_deg;   // how the sample was mounted: recorded, nothing moves
+    // States of the light, enum polarisation or POL_IN_LASER (what the bench says of its laser),
+    // and of the analyser (POL_U: none); how they combine says pol_combine.
+    int pol_in[CAMPAIGN_STATES], pol_in_count;
+    int pol_out[CAMPAIGN_STATES], pol_out_count;
+    int pol_combine;       // enum campaign_combine
     double blind_half_deg; // |theta_r + theta_i| < this is skipped: the detector shadows the beam;
                            // 0: nothing
     int readings, dark_readings, beam_readings; // samples averaged a point
@@ -46,6 +60,10 @@ int campaign_config_load(const char *path, struct cfg_sink sink, struct campaign
 // The same from a text; name stands in messages where the path would.
 int campaign_config_parse(const char *text, const char *name, struct cfg_sink sink,
                           struct campaign_config *ret_config);
+
+// What each sweep is measured in, in order; returns how many, at least 1.
+int campaign_channels(const struct campaign_config *c,
+                      struct campaign_channel ret_channels[CAMPAIGN_CHANNELS]);
 
 // What the campaign asks of the fit: method, weights, diffuse part, seed, dense weight and zone
 // (wider by 0.01 deg, so that an encoder's last digit does not push a point of the edge out of it).

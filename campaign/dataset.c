@@ -303,55 +303,42 @@ int dataset_from_csv(const char *path, const char *column, const struct dataset_
 
 // --- campaign files ------------------------------------------------------------------------------
 
-// The encoder may say -0.0003 deg for 0: the same geometry with both signs turned round.
-static struct row row_of(const struct reduced_point *p, enum brdf_state in, enum brdf_state out)
+_Static_assert((int)POL_U == (int)BRDF_STATE_U && (int)POL_L == (int)BRDF_STATE_L &&
+                   (int)POL_KNOWN == (int)BRDF_STATES,
+               "the states of a campaign are those of the model, and unknown");
+
+// The encoder may say -0.0003 deg for 0: the same geometry with both signs turned round. Light of
+// an unknown state is taken for unpolarised, and a note says so.
+static struct row row_of(const struct reduced_point *p)
 {
     const double theta_r_deg = p->theta_i_deg < 0 ? -p->theta_r_deg : p->theta_r_deg;
+    const int in = p->pol_in == POL_UNKNOWN ? POL_U : p->pol_in;
     return (struct row){.direction = direction_in_plane(fabs(p->theta_i_deg), theta_r_deg),
                         .f = p->f_per_sr,
                         .u = p->u_a_per_sr,
-                        .in = in,
-                        .out = out};
+                        .in = (enum brdf_state)in,
+                        .out = (enum brdf_state)p->pol_out};
 }
 
-static int take_points(const struct plan *plan, const struct reduction *r, enum brdf_state out,
+static int take_points(const struct plan *plan, const struct reduction *r,
                        const struct dataset_filter *filter, struct dataset *d,
                        struct gon_error *err)
 {
-    // Light of an unknown state is taken for unpolarised, and a note says so.
-    const enum brdf_state in =
-        r->polarisation == POL_UNKNOWN ? BRDF_STATE_U : (enum brdf_state)r->polarisation;
     size_t room = 0;
     int rc = GON_OK;
-    for (int i = 0, k = 0; k < r->count && rc >= 0; i++) {
+    for (int k = 0; k < r->count && rc >= 0; k++) {
         const struct reduced_point *p = &r->points[k];
-        if (plan->points[i].sweep != p->sweep || plan->points[i].point != p->point)
-            continue;
-        const struct row row = row_of(p, in, out);
-        if (passes(filter, plan->points[i].theta_i_deg))
+        const struct row row = row_of(p);
+        if (p->pol_out == POL_UNKNOWN)
+            rc = gon_fail(err, GON_E_INPUT, "%s: the file does not say which analyser was used",
+                          d->source);
+        else if (passes(filter, plan->points[p->index].theta_i_deg))
             rc = add(d, &room, &row, err);
         else
             d->left_out++;
-        k++;
     }
     d->u_scale = r->u_scale_rel;
     return rc >= 0 ? finish(d, "f_r", err) : rc;
-}
-
-_Static_assert((int)POL_U == (int)BRDF_STATE_U && (int)POL_L == (int)BRDF_STATE_L &&
-                   (int)POL_UNKNOWN == (int)BRDF_STATES,
-               "the states of a campaign are those of the model, and unknown");
-
-static int read_analyser(struct store *s, enum brdf_state *ret_out, struct gon_error *err)
-{
-    char *name = store_read_meta(s, "pol_out");
-    int state = name ? brdf_state_find(name) : -1;
-    free(name);
-    if (state < 0)
-        return gon_fail(err, GON_E_INPUT, "%s: the file does not say which analyser was used",
-                        store_path(s));
-    *ret_out = (enum brdf_state)state;
-    return GON_OK;
 }
 
 int dataset_from_store(struct store *s, const struct dataset_filter *filter,
@@ -361,15 +348,12 @@ int dataset_from_store(struct store *s, const struct dataset_filter *filter,
     struct dataset d = {0};
     struct plan plan = {0};
     struct reduction r = {0};
-    enum brdf_state out = BRDF_STATE_U;
-    int rc = read_analyser(s, &out, err);
-    if (rc >= 0)
-        rc = store_read_plan(s, &plan, err);
+    int rc = store_read_plan(s, &plan, err);
     if (rc >= 0)
         rc = reduce_campaign(s, &r, err);
     snprintf(d.source, sizeof d.source, "%s", store_path(s));
     if (rc >= 0)
-        rc = take_points(&plan, &r, out, filter, &d, err);
+        rc = take_points(&plan, &r, filter, &d, err);
     if (rc >= 0)
         reduction_warning(&r, d.note, sizeof d.note);
     plan_clear(&plan);

@@ -2,11 +2,15 @@
 // The plan: every point of a campaign in the order of measurement. Computed from the configuration
 // alone, and from the bench where there is one; moves nothing. Thread: any.
 //
-//   sweep 0            dark (laser off), then the beam
+//   sweep 0            dark (laser off), then the beam in each state of the light
 //   sweep 1..sweeps    one theta_i each, in the file's order; theta_r from low to high, so that the
 //                      axis always comes from the same side; coarse grid and dense zone merged, a
 //                      direction that both ask for is measured once
-//   sweep sweeps + 1   the beam again, then dark (laser off)
+//   sweep sweeps + 1   the beam again in each state, then dark (laser off)
+//
+// With several states of polarisation a sweep is measured in one after the other, all directions
+// in each: elements move slowly, so they move once a state and not once a direction; and the fit
+// after a sweep, or a campaign that was stopped, has every state of the sweeps it has.
 #pragma once
 #include "base/err.h"
 #include "campaign/bench.h"
@@ -15,7 +19,13 @@
 #include <stdbool.h>
 
 enum plan_kind { PLAN_SAMPLE, PLAN_BEAM, PLAN_DARK };
-enum plan_skip_reason { PLAN_SKIP_BLIND, PLAN_SKIP_LIMITS };
+enum plan_skip_reason {
+    PLAN_SKIP_BLIND,
+    PLAN_SKIP_LIMITS,   // of an axis, in sweeps
+    PLAN_SKIP_KEEP_OUT, // lies in one
+    PLAN_SKIP_CUT_OFF,  // a keep-out is in the way from the point before
+    PLAN_SKIP_REASONS
+};
 enum { PLAN_MOST_POINTS = 1000000 };
 
 struct plan_point {
@@ -24,6 +34,7 @@ struct plan_point {
     char station[BENCH_NAME]; // "" on the sample
     double theta_i_deg;       // nominal, multiples of 1e-6; of a station with a bench, else 0
     double theta_r_deg;       // signed: positive forward
+    int pol_in, pol_out;      // enum polarisation; unknown also where "laser" has no bench
     double weight;            // g of eq. 17
     bool dense;               // within the dense zone
     bool done;                // has an accepted reading; false in a new plan
@@ -48,13 +59,14 @@ struct plan {
     double duration_s; // estimate; NAN without a bench
 };
 
-// bench may be NULL. GON_E_INPUT: more than PLAN_MOST_POINTS, or nothing is left to measure.
+// bench may be NULL. GON_E_INPUT: more than PLAN_MOST_POINTS, nothing is left to measure, or no way
+// to the beam's station.
 int plan_make(const struct campaign_config *config, const struct bench_config *bench,
               struct plan *ret_plan, struct gon_error *err);
 void plan_clear(struct plan *p); // frees what it holds, not p; NULL is fine
 
 const char *plan_kind_name(enum plan_kind k); // "sample", "beam", "dark"
-// "in the detector's shadow", "beyond an axis's limits"
+// "in the detector's shadow", "beyond an axis's limits", ...
 const char *plan_skip_text(enum plan_skip_reason r);
 
 // What a reading costs the detector (daemon/acquire.h says why): until the step response of n equal

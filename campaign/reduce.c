@@ -2,6 +2,7 @@
 #include "campaign/reduce.h"
 
 #include "base/units.h"
+#include "campaign/reduce_elements.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -156,9 +157,15 @@ static double without_nan(double value)
     return isnan(value) ? 0 : value;
 }
 
+struct beam {
+    struct mean signal, monitor, ratio;
+    int samples, out; // out: what stood before the detector
+};
+
 struct references {
-    struct mean dark_signal, dark_monitor, beam_signal, beam_monitor, beam_ratio;
-    int dark_samples, beam_samples;
+    struct mean dark_signal, dark_monitor;
+    int dark_samples;
+    struct beam beam[POL_COUNT]; // by the light's state
 };
 
 static void add_darks(struct references *f, const struct plan *plan,
@@ -179,21 +186,28 @@ static void add_beams(struct references *f, const struct plan *plan,
 {
     const double dark_signal = mean_of(&f->dark_signal), dark_monitor = mean_of(&f->dark_monitor);
     for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
-        const struct store_reading *r = reading_of(&plan->points[i], rows, count, &at);
-        if (!r || plan->points[i].kind != PLAN_BEAM)
+        const struct plan_point *p = &plan->points[i];
+        const struct store_reading *r = reading_of(p, rows, count, &at);
+        if (!r || p->kind != PLAN_BEAM)
             continue;
+        struct beam *b = &f->beam[p->pol_in];
         const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
-        mean_add(&f->beam_signal, r->signal_v);
-        mean_add(&f->beam_monitor, r->monitor_v);
-        mean_add(&f->beam_ratio, (r->signal_v - dark_signal) / monitor);
-        f->beam_samples += r->count;
+        mean_add(&b->signal, r->signal_v);
+        mean_add(&b->monitor, r->monitor_v);
+        mean_add(&b->ratio, (r->signal_v - dark_signal) / monitor);
+        b->samples += r->count;
+        b->out = p->pol_out;
     }
 }
 
 static struct reduce_reference means(const struct references *f)
 {
-    return (struct reduce_reference){mean_of(&f->dark_signal), mean_of(&f->dark_monitor),
-                                     mean_of(&f->beam_signal), mean_of(&f->beam_monitor)};
+    struct reduce_reference r = {mean_of(&f->dark_signal), mean_of(&f->dark_monitor), {0}, {0}};
+    for (int i = 0; i < POL_COUNT; i++) {
+        r.beam_signal_v[i] = mean_of(&f->beam[i].signal);
+        r.beam_monitor_v[i] = mean_of(&f->beam[i].monitor);
+    }
+    return r;
 }
 
 struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
@@ -214,24 +228,24 @@ static double cosine(const struct reduction *r, const struct reduced_point *p)
 
 // False when this point has no value: at or below the horizon, or with the light gone.
 static bool reduce_point(const struct reduction *r, const struct store_reading *row,
-                         double beam_ratio, struct reduced_point *p)
+                         const struct reduce_channel *channel, struct reduced_point *p)
 {
     const double monitor =
         isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(r->reference.dark_monitor_v);
-    const double scale = 1 / (beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
+    const double scale =
+        1 / (channel->beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
     if (!(cosine(r, p) > 1e-6) || !(monitor > 0))
         return false;
     p->f_per_sr = scale * (row->signal_v - r->reference.dark_signal_v) / monitor;
     const double u_signal = sample_u_v(&r->noise, row->signal_v) / sqrt(row->count);
     const double u_monitor = r->noise.rel_monitor / sqrt(row->count);
     p->u_a_per_sr = hypot(scale * hypot(u_signal, r->u_dark_v) / monitor, p->f_per_sr * u_monitor);
-    p->u_b_per_sr = fabs(p->f_per_sr) * r->u_scale_rel;
+    p->u_b_per_sr = fabs(p->f_per_sr) * channel->u_scale_rel;
     return isfinite(p->f_per_sr);
 }
 
 static int reduce_points(struct reduction *r, const struct plan *plan,
-                         const struct store_reading *rows, int count, double beam_ratio,
-                         struct gon_error *err)
+                         const struct store_reading *rows, int count, struct gon_error *err)
 {
     r->points = calloc((size_t)plan->samples + 1, sizeof *r->points);
     if (!r->points)
@@ -245,10 +259,13 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
         *p = (struct reduced_point){.sweep = row->sweep,
                                     .point = row->point,
                                     .attempt = row->attempt,
+                                    .index = i,
+                                    .pol_in = point->pol_in,
+                                    .pol_out = point->pol_out,
                                     .theta_i_deg = units_deg_of_udeg(row->theta_i_udeg),
                                     .theta_r_deg = units_deg_of_udeg(row->theta_r_udeg),
                                     .weight = point->weight};
-        if (reduce_point(r, row, beam_ratio, p))
+        if (reduce_point(r, row, reduce_channel_of(r, p->pol_in, p->pol_out), p))
             r->count++;
         else
             r->left_out++;
@@ -258,56 +275,100 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
 
 // --- all of it -----------------------------------------------------------------------------------
 
-static int reduce_references(struct reduction *r, const struct references *f,
-                             double *ret_beam_ratio, struct gon_error *err)
+static int reduce_dark(struct reduction *r, const struct references *f, struct gon_error *err)
 {
-    const double ratio = mean_of(&f->beam_ratio);
     r->darks = f->dark_signal.n;
-    r->beams = f->beam_signal.n;
+    for (int i = 0; i < POL_COUNT; i++)
+        r->beams += f->beam[i].signal.n;
     r->reference = means(f);
+    r->u_dark_v =
+        hypot(mean_u(&f->dark_signal), without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
     if (!r->darks || !r->beams)
         return gon_fail(err, GON_E_INPUT, "no %s reading yet: without it there is no absolute BRDF",
                         r->darks ? "beam" : "dark");
-    if (!(ratio > 0) || !isfinite(ratio))
-        return gon_fail(err, GON_E_INPUT,
-                        "the beam (%.4g V, monitor %.4g V) is not above the dark (%.4g V, monitor "
-                        "%.4g V); look at station 'beam', laser and monitor",
-                        r->reference.beam_signal_v, r->reference.beam_monitor_v,
-                        r->reference.dark_signal_v, r->reference.dark_monitor_v);
-    const double noise =
-        without_nan(sample_u_v(&r->noise, r->reference.beam_signal_v)) / r->reference.beam_signal_v;
-    r->u_dark_v =
-        hypot(mean_u(&f->dark_signal), without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
-    r->u_beam_rel = hypot(mean_u(&f->beam_ratio) / ratio,
-                          hypot(noise, r->noise.rel_monitor) / sqrt(f->beam_samples));
-    *ret_beam_ratio = ratio;
     return GON_OK;
+}
+
+static int check_beam(const struct reduction *r, const struct beam *beam, int pol_in,
+                      struct gon_error *err)
+{
+    const double ratio = mean_of(&beam->ratio);
+    if (!beam->signal.n)
+        return gon_fail(err, GON_E_INPUT,
+                        "no beam reading yet of pol_in = \"%s\": without it there is no absolute "
+                        "BRDF",
+                        polarisation_name((enum polarisation)pol_in));
+    if (ratio > 0 && isfinite(ratio))
+        return GON_OK;
+    return gon_fail(err, GON_E_INPUT,
+                    "the beam (%.4g V, monitor %.4g V) is not above the dark (%.4g V, monitor "
+                    "%.4g V); look at station 'beam', laser and monitor",
+                    r->reference.beam_signal_v[pol_in], r->reference.beam_monitor_v[pol_in],
+                    r->reference.dark_signal_v, r->reference.dark_monitor_v);
+}
+
+static int add_channel(struct reduction *r, const struct references *f,
+                       const struct bench_config *bench, const struct plan_point *p,
+                       struct gon_error *err)
+{
+    const struct beam *beam = &f->beam[p->pol_in];
+    struct reduce_channel *c = &r->channel[r->channels];
+    int rc = check_beam(r, beam, p->pol_in, err);
+    if (rc < 0)
+        return rc;
+    const double ratio = mean_of(&beam->ratio), signal_v = r->reference.beam_signal_v[p->pol_in];
+    const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
+    const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
+    *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};
+    c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
+                                            &c->u_analyser_rel);
+    c->u_beam_rel = hypot(mean_u(&beam->ratio) / ratio,
+                          hypot(noise, r->noise.rel_monitor) / sqrt(beam->samples));
+    c->u_scale_rel = hypot(hypot(c->u_beam_rel, c->u_analyser_rel), shared);
+    r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
+    r->u_scale_rel = fmax(r->u_scale_rel, c->u_scale_rel);
+    r->polarisation = p->pol_in == POL_UNKNOWN || !r->channels ? p->pol_in : r->polarisation;
+    r->channels++;
+    return GON_OK;
+}
+
+static int reduce_channels(struct reduction *r, const struct references *f,
+                           const struct bench_config *bench, const struct plan *plan,
+                           struct gon_error *err)
+{
+    int rc = GON_OK;
+    for (int i = 0; i < plan->count && rc >= 0; i++) {
+        const struct plan_point *p = &plan->points[i];
+        if (p->kind == PLAN_SAMPLE && !reduce_channel_of(r, p->pol_in, p->pol_out))
+            rc = r->channels < CAMPAIGN_CHANNELS
+                     ? add_channel(r, f, bench, p, err)
+                     : gon_fail(err, GON_E_INPUT, "the plan has more states than there are");
+    }
+    return rc;
 }
 
 int reduce_run(const struct bench_config *bench, const struct plan *plan,
                const struct store_reading *rows, int count, struct reduction *ret_reduction,
                struct gon_error *err)
 {
-    struct reduction r = {.omega_sr = bench_omega_sr(bench),
-                          .regime = bench->regime,
-                          .polarisation = bench->laser.polarisation};
+    struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
     struct references f = {0};
-    double beam_ratio = 0;
     add_darks(&f, plan, rows, count, plan->sweeps + 1);
     add_beams(&f, plan, rows, count, plan->sweeps + 1);
     r.noise = reduce_noise_of(plan, rows, count);
-    int rc = reduce_references(&r, &f, &beam_ratio, err);
-    if (rc < 0)
-        return rc;
     r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
     r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
     r.u_linearity_rel = bench->detector.u_linearity_rel;
-    r.u_scale_rel =
-        hypot(hypot(r.u_beam_rel, r.u_radius_rel), hypot(r.u_distance_rel, r.u_linearity_rel));
-    rc = reduce_points(&r, plan, rows, count, beam_ratio, err);
+    int rc = reduce_dark(&r, &f, err);
     if (rc >= 0)
-        *ret_reduction = r;
-    return rc;
+        rc = reduce_channels(&r, &f, bench, plan, err);
+    if (rc >= 0)
+        rc = reduce_points(&r, plan, rows, count, err);
+    if (rc < 0)
+        return rc;
+    reduce_add_leaks(&r, plan, bench);
+    *ret_reduction = r;
+    return GON_OK;
 }
 
 int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err)
@@ -322,12 +383,6 @@ int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon
         rc = store_read_readings(s, -1, &rows, err);
     if (rc >= 0)
         rc = reduce_run(&bench, &plan, rows, rc, ret_reduction, err);
-    if (rc >= 0) {
-        char *pol_in = store_read_meta(s, "pol_in");
-        int pol = pol_in ? polarisation_find(pol_in) : POL_UNKNOWN;
-        ret_reduction->polarisation = pol < 0 ? POL_UNKNOWN : pol;
-        free(pol_in);
-    }
     plan_clear(&plan);
     free(rows);
     return rc;

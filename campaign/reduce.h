@@ -9,6 +9,12 @@
 // Opening and closing beam and dark are averaged; half their difference is part of their
 // uncertainty. Angles are those of the encoders.
 //
+// Each reading is divided by the beam of its own pol_in, which is measured without analyser; f of
+// a reading behind the analyser is divided by its transmission T as well, so that f = 1/2 a^T F g
+// of an ideal one. Where the analyser cannot be taken out T cancels and what it passes of the
+// beam's light (polarisation_passed) is multiplied in. Only a bench whose elements move knows of
+// either: without pol_out states in its file the analyser stood in the beam as on the sample.
+//
 // u_A, uncorrelated from point to point: noise of signal and monitor, and of the dark. With four
 // samples a point the scatter of one point says little (its sd is uncertain by 40 %), and weights
 // from it would favour points that happened to scatter little. So one model for all,
@@ -17,7 +23,10 @@
 // distribution with (count - 1)/2 degrees of shape). Likewise rel_monitor.
 // Fluctuations of the laser that the monitor divides out count in both: u_A is rather too large
 // than too small.
-// u_B, common to all points as one factor: beam, 2u(r)/r, 2u(d)/d, linearity.
+// u_B, common to all points of a channel (a pol_in and pol_out) as one factor: beam, 2u(r)/r,
+// 2u(d)/d, linearity, u(T)/T. Elements that pass up to a part e of crossed light add 0..e f_x to f;
+// u_B has e f_x/sqrt(3) of it (rectangular, not corrected), f_x being the reading of the crossed
+// state in the same direction where there is one, else f itself.
 // Thread: any.
 #pragma once
 #include "base/err.h"
@@ -27,6 +36,8 @@
 
 struct reduced_point {
     int sweep, point, attempt;
+    int index;                       // of its point in the plan
+    int pol_in, pol_out;             // enum polarisation
     double theta_i_deg, theta_r_deg; // from the encoders; theta_r signed
     double f_per_sr;
     double u_a_per_sr; // NAN when no reading had two samples or none scattered
@@ -41,7 +52,14 @@ struct reduce_noise {
 
 struct reduce_reference { // means of the accepted readings; NAN where there is none
     double dark_signal_v, dark_monitor_v;
-    double beam_signal_v, beam_monitor_v;
+    double beam_signal_v[POL_COUNT], beam_monitor_v[POL_COUNT]; // by the light's state
+};
+
+struct reduce_channel {
+    int pol_in, pol_out;
+    double beam_ratio; // [(S0 - Ds0)/(M0 - Dm0)], as a reading of f = 1 per sr would divide it
+    double u_beam_rel, u_analyser_rel;
+    double u_scale_rel; // these and what all channels share
 };
 
 struct reduction {
@@ -54,10 +72,13 @@ struct reduction {
     struct reduce_reference reference;
     double u_dark_v; // of the dark signal's mean
     struct reduce_noise noise;
-    double u_beam_rel, u_radius_rel, u_distance_rel, u_linearity_rel;
-    double u_scale_rel; // all of them
+    double u_beam_rel; // the largest of the channels
+    double u_radius_rel, u_distance_rel, u_linearity_rel;
+    double u_scale_rel; // all of them; the largest of the channels
     int regime;         // enum bench_regime
-    int polarisation;   // of the light on the sample, enum polarisation
+    int polarisation;   // of the light on the sample; POL_UNKNOWN when any of it is
+    struct reduce_channel channel[CAMPAIGN_CHANNELS]; // in the plan's order
+    int channels;
 };
 
 // What the numbers are not, in one sentence: with a laser of unknown polarisation they are neither
@@ -65,12 +86,12 @@ struct reduction {
 // say.
 int reduction_warning(const struct reduction *r, char *text, size_t size);
 
-// Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark or no beam reading yet, or a
-// beam that is not above the dark.
+// Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark yet, or no beam in one of
+// the light's states, or a beam that is not above the dark.
 int reduce_run(const struct bench_config *bench, const struct plan *plan,
                const struct store_reading *rows, int count, struct reduction *ret_reduction,
                struct gon_error *err);
-// The same from a campaign file, with the bench and the polarisation that are kept in it.
+// The same from a campaign file, with the bench that is kept in it.
 int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err);
 void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL is fine
 

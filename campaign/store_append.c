@@ -119,9 +119,10 @@ static int put_reduction(struct store *s, int64_t t_utc_ms, const struct reducti
                          struct gon_error *err)
 {
     sqlite3_stmt *q;
+    const int first = r->channel[0].pol_in;
     const double values[] = {r->omega_sr,
-                             r->reference.beam_signal_v,
-                             r->reference.beam_monitor_v,
+                             r->reference.beam_signal_v[first],
+                             r->reference.beam_monitor_v[first],
                              r->reference.dark_signal_v,
                              r->reference.dark_monitor_v,
                              r->u_dark_v,

@@ -9,7 +9,8 @@
 
 enum {
     STORE_APPLICATION = 0x676f6e69, // "goni"
-    STORE_VERSION = 1,
+    STORE_VERSION = 2,
+    STORE_VERSION_ONE_STATE = 1, // of files whose points are all of one state of polarisation
     STORE_PATIENCE_MS = 8000
 };
 

@@ -24,6 +24,13 @@ static void copy_text(sqlite3_stmt *q, int column, char *text, size_t size)
 
 // --- plan ----------------------------------------------------------------------------------------
 
+static int state_of(sqlite3_stmt *q, int column)
+{
+    const char *name = (const char *)sqlite3_column_text(q, column);
+    const int state = name ? polarisation_find(name) : -1;
+    return state < 0 ? POL_UNKNOWN : state;
+}
+
 static int add_point(struct plan *p, int *room, sqlite3_stmt *q)
 {
     if (p->count == *room) {
@@ -43,7 +50,9 @@ static int add_point(struct plan *p, int *room, sqlite3_stmt *q)
                                  .theta_i_deg = units_deg_of_udeg(sqlite3_column_int64(q, 4)),
                                  .theta_r_deg = units_deg_of_udeg(sqlite3_column_int64(q, 5)),
                                  .weight = sqlite3_column_double(q, 6),
-                                 .dense = sqlite3_column_int(q, 7)};
+                                 .dense = sqlite3_column_int(q, 7),
+                                 .pol_in = state_of(q, 8),
+                                 .pol_out = state_of(q, 9)};
     copy_text(q, 3, point->station, sizeof point->station);
     p->samples += point->kind == PLAN_SAMPLE;
     return GON_OK;
@@ -56,7 +65,7 @@ static int read_points(struct store *s, struct plan *p, struct gon_error *err)
         rc = store_db_prepare(
             s,
             "SELECT sweep, point, kind, station, theta_i_udeg, theta_r_udeg, weight,"
-            " dense FROM plan ORDER BY sweep, point",
+            " dense, pol_in, pol_out FROM plan ORDER BY sweep, point",
             &q, err);
     if (rc < 0)
         return rc;

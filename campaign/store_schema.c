@@ -102,17 +102,29 @@ static int put_number(struct store *s, const char *key, double value, struct gon
     return store_db_finish(s, statement, err);
 }
 
-static const char *pol_in(const struct store_new *what)
+// The states of one side on the sample, in order, each once: "s" or "s, p".
+static void states_text(const struct plan *plan, bool in, char *text, size_t size)
 {
-    int pol = what->config->pol_in == POL_IN_LASER ? what->bench->laser.polarisation
-                                                   : what->config->pol_in;
-    return polarisation_name((enum polarisation)pol);
+    bool seen[POL_COUNT] = {false};
+    *text = 0;
+    for (int i = 0; i < plan->count; i++) {
+        const struct plan_point *p = &plan->points[i];
+        const int state = in ? p->pol_in : p->pol_out;
+        const size_t used = strlen(text);
+        if (p->kind != PLAN_SAMPLE || seen[state])
+            continue;
+        snprintf(text + used, size - used, "%s%s", used ? ", " : "",
+                 polarisation_name((enum polarisation)state));
+        seen[state] = true;
+    }
 }
 
 static int put_meta(struct store *s, const struct store_new *what, struct gon_error *err)
 {
-    char config_crc[16], bench_crc[16], created[24];
+    char config_crc[16], bench_crc[16], created[24], pol_in[60], pol_out[60];
     const struct campaign_config *c = what->config;
+    states_text(what->plan, true, pol_in, sizeof pol_in);
+    states_text(what->plan, false, pol_out, sizeof pol_out);
     snprintf(config_crc, sizeof config_crc, "%08x",
              crc32c(0, what->config_text, strlen(what->config_text)));
     snprintf(bench_crc, sizeof bench_crc, "%08x",
@@ -132,8 +144,8 @@ static int put_meta(struct store *s, const struct store_new *what, struct gon_er
         {"bench_crc32c", bench_crc},
         {"bench_name", what->bench->name},
         {"regime", what->bench->regime == BENCH_OVERFILLED ? "overfilled" : "underfilled"},
-        {"pol_in", pol_in(what)},
-        {"pol_out", polarisation_name((enum polarisation)c->pol_out)},
+        {"pol_in", pol_in},
+        {"pol_out", pol_out},
     };
     int rc = GON_OK;
     for (size_t i = 0; i < sizeof texts / sizeof *texts && rc >= 0; i++)
@@ -160,8 +172,8 @@ static int put_point(struct store *s, const struct store_new *what, const struct
     sqlite3_bind_int64(q, 5, units_udeg(p->theta_i_deg));
     sqlite3_bind_int64(q, 6, units_udeg(p->theta_r_deg));
     sqlite3_bind_int64(q, 7, units_udeg(what->config->phi_deg));
-    store_db_bind_text(q, 8, pol_in(what));
-    store_db_bind_text(q, 9, polarisation_name((enum polarisation)what->config->pol_out));
+    store_db_bind_text(q, 8, polarisation_name((enum polarisation)p->pol_in));
+    store_db_bind_text(q, 9, polarisation_name((enum polarisation)p->pol_out));
     sqlite3_bind_double(q, 10, p->weight);
     sqlite3_bind_int(q, 11, p->dense);
     return store_db_finish(s, q, err);
@@ -214,11 +226,21 @@ static int put_plan(struct store *s, const struct store_new *what, struct gon_er
     return rc >= 0 ? put_text(s, "plan_crc32c", text, err) : rc;
 }
 
+// A gonio that reads version 1 only would take all beams for one state's.
+static int version_of(const struct plan *plan)
+{
+    for (int i = 1; i < plan->count; i++)
+        if (plan->points[i].pol_in != plan->points[0].pol_in ||
+            plan->points[i].pol_out != plan->points[0].pol_out)
+            return STORE_VERSION;
+    return STORE_VERSION_ONE_STATE;
+}
+
 int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err)
 {
     char pragmas[120];
     snprintf(pragmas, sizeof pragmas, "PRAGMA application_id = %d; PRAGMA user_version = %d;",
-             STORE_APPLICATION, STORE_VERSION);
+             STORE_APPLICATION, version_of(what->plan));
     int rc = store_db_begin(s, err);
     if (rc < 0)
         return rc;

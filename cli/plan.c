@@ -27,7 +27,7 @@ static const struct option_row rows[] = {
 struct sweep {
     double theta_i_deg;
     int points, dense, skipped;
-    int skipped_for[PLAN_SKIP_LIMITS + 1]; // by enum plan_skip_reason
+    int skipped_for[PLAN_SKIP_REASONS]; // by enum plan_skip_reason
 };
 
 static void duration_text(double s, char *text, size_t size)
@@ -64,7 +64,7 @@ static struct sweep sweep_of(const struct plan *p, const struct campaign_config 
 static void why_text(const struct sweep *s, char *text, size_t size)
 {
     *text = 0;
-    for (int reason = PLAN_SKIP_BLIND; reason <= PLAN_SKIP_LIMITS; reason++) {
+    for (int reason = 0; reason < PLAN_SKIP_REASONS; reason++) {
         size_t used = strlen(text);
         if (s->skipped_for[reason])
             snprintf(text + used, size - used, "%s%d %s", used ? ", " : "", s->skipped_for[reason],
@@ -72,7 +72,46 @@ static void why_text(const struct sweep *s, char *text, size_t size)
     }
 }
 
-static void print_plan(const struct plan *p, const struct campaign_config *c, const char *path)
+// Of a state of the light: unknown without a bench is what the laser will be.
+static const char *light_name(int pol_in, bool has_bench)
+{
+    return pol_in == POL_UNKNOWN && !has_bench ? "laser"
+                                               : polarisation_name((enum polarisation)pol_in);
+}
+
+// What each sweep is measured in, in order; as the plan resolved it.
+static int states_of(const struct plan *p, struct campaign_channel ret_states[CAMPAIGN_CHANNELS])
+{
+    int n = 0;
+    for (int i = 0; i < p->count; i++) {
+        const struct plan_point *q = &p->points[i];
+        int k = 0;
+        while (k < n && (ret_states[k].in != q->pol_in || ret_states[k].out != q->pol_out))
+            k++;
+        if (q->kind == PLAN_SAMPLE && k == n)
+            ret_states[n++] = (struct campaign_channel){q->pol_in, q->pol_out};
+    }
+    return n;
+}
+
+// "s, p" or, behind an analyser, "s>s, p>p".
+static void say_states(const struct plan *p, bool has_bench)
+{
+    struct campaign_channel states[CAMPAIGN_CHANNELS];
+    const int n = states_of(p, states);
+    if (n == 1 && states[0].out == POL_U)
+        return;
+    fprintf(stderr, "each sweep in %d state%s of polarisation%s: ", n, n == 1 ? "" : "s",
+            n == 1 ? "" : ", one after the other");
+    for (int i = 0; i < n; i++)
+        fprintf(stderr, "%s%s%s%s", i ? ", " : "", light_name(states[i].in, has_bench),
+                states[i].out == POL_U ? "" : ">",
+                states[i].out == POL_U ? "" : polarisation_name((enum polarisation)states[i].out));
+    fprintf(stderr, "\n");
+}
+
+static void print_plan(const struct plan *p, const struct campaign_config *c, const char *path,
+                       bool has_bench)
 {
     char time[60], dense[40];
     duration_text(p->duration_s, time, sizeof time);
@@ -81,6 +120,7 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
             "%s: %d sweeps, %d points on the sample and %d reference readings, %d samples a point, "
             "%s\n",
             c->name, p->sweeps, p->samples, p->count - p->samples, c->readings, time);
+    say_states(p, has_bench);
     struct table *t = table_new(6);
     bool terminal = out_is_terminal(stdout);
     const char *head[] = {"sweep",   terminal ? "θi" : "theta_i_deg",
@@ -92,7 +132,7 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
             table_right(t, i);
     }
     for (int i = 1; i <= p->sweeps; i++) {
-        char why[120];
+        char why[200];
         struct sweep s = sweep_of(p, c, i);
         why_text(&s, why, sizeof why);
         table_cell(t, "%d", i);
@@ -110,16 +150,29 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
             p->warnings_count == 1 ? "warning" : "warnings", path);
 }
 
-static json_t *points_json(const struct plan *p)
+static json_t *states_json(const struct plan *p, bool has_bench)
+{
+    struct campaign_channel states[CAMPAIGN_CHANNELS];
+    json_t *all = json_array();
+    for (int i = 0, n = states_of(p, states); i < n; i++)
+        json_array_append_new(all, json_pack("{s:s, s:s}", "pol_in",
+                                             light_name(states[i].in, has_bench), "pol_out",
+                                             polarisation_name((enum polarisation)states[i].out)));
+    return all;
+}
+
+static json_t *points_json(const struct plan *p, bool has_bench)
 {
     json_t *all = json_array();
     for (int i = 0; i < p->count; i++) {
         const struct plan_point *q = &p->points[i];
         json_array_append_new(
-            all, json_pack("{s:i, s:i, s:s, s:s, s:f, s:f, s:f, s:b}", "sweep", q->sweep, "point",
-                           q->point, "kind", plan_kind_name(q->kind), "station", q->station,
-                           "theta_i_deg", q->theta_i_deg, "theta_r_deg", q->theta_r_deg, "weight",
-                           q->weight, "dense", q->dense));
+            all, json_pack("{s:i, s:i, s:s, s:s, s:f, s:f, s:s, s:s, s:f, s:b}", "sweep", q->sweep,
+                           "point", q->point, "kind", plan_kind_name(q->kind), "station",
+                           q->station, "theta_i_deg", q->theta_i_deg, "theta_r_deg", q->theta_r_deg,
+                           "pol_in", light_name(q->pol_in, has_bench), "pol_out",
+                           polarisation_name((enum polarisation)q->pol_out), "weight", q->weight,
+                           "dense", q->dense));
     }
     return all;
 }
@@ -148,7 +201,7 @@ static json_t *sweeps_json(const struct plan *p, const struct campaign_config *c
     return all;
 }
 
-static void print_json(const struct plan *p, const struct campaign_config *c)
+static void print_json(const struct plan *p, const struct campaign_config *c, bool has_bench)
 {
     json_t *warnings = json_array();
     for (int i = 0; i < p->warnings_count; i++)
@@ -159,7 +212,8 @@ static void print_json(const struct plan *p, const struct campaign_config *c)
     json_object_set_new(o, "duration_s",
                         isfinite(p->duration_s) ? json_real(p->duration_s) : json_null());
     json_object_set_new(o, "sweeps", sweeps_json(p, c));
-    json_object_set_new(o, "order", points_json(p));
+    json_object_set_new(o, "states", states_json(p, has_bench));
+    json_object_set_new(o, "order", points_json(p, has_bench));
     json_object_set_new(o, "skipped", skips_json(p));
     json_object_set_new(o, "warnings", warnings);
     out_json(o);
@@ -184,18 +238,20 @@ static int run_plan(const struct verb *verb, int argc, char **argv)
     if (plan_make(&config, o.bench ? &bench : NULL, &plan, &err) < 0)
         return out_fail(&err);
     if (o.json)
-        print_json(&plan, &config);
+        print_json(&plan, &config, o.bench);
     else
-        print_plan(&plan, &config, path);
+        print_plan(&plan, &config, path, o.bench);
     plan_clear(&plan);
     return EXIT_OK;
 }
 
-const struct verb verb_plan = {"plan",
-                               "CAMPAIGN.cfg",
-                               "the dry run: points, order, time, warnings; moves nothing",
-                               "Prints every sweep with its points, what is skipped and why, "
-                               "warnings, and with --bench the time it\n"
-                               "takes and the points beyond the axes' limits.\n",
-                               rows,
-                               run_plan};
+const struct verb verb_plan = {
+    "plan",
+    "CAMPAIGN.cfg",
+    "the dry run: points, order, time, warnings; moves nothing",
+    "Prints every sweep with its points, what is skipped and why, "
+    "warnings, and with --bench the time it\n"
+    "takes and the points that it cannot reach: beyond the axes' limits, or in or behind a\n"
+    "keep-out.\n",
+    rows,
+    run_plan};

@@ -2,6 +2,8 @@
 #include "daemon/api.h"
 
 #include "daemon/hub.h"
+#include "daemon/inventory.h"
+#include "daemon/metrics.h"
 #include "daemon/view.h"
 
 #include <jansson.h>
@@ -39,7 +41,7 @@ static const char *what_to_do(int gon_code)
 
 static struct http_reply reply(int status, char *body)
 {
-    return (struct http_reply){status, body, NULL};
+    return (struct http_reply){.status = status, .body = body};
 }
 
 static struct http_reply fail(int status, const char *error, const char *where, const char *next)
@@ -116,6 +118,32 @@ static struct http_reply get_status(const struct call *c)
     return reply(200, view_text(o));
 }
 
+static struct http_reply get_devices(const struct call *c)
+{
+    struct hub_status s;
+    hub_status(c->hub, &s);
+    return reply(200, view_text(json_pack("{s:i, s:o}", "pid", (int)getpid(), "devices",
+                                          inventory_view(s.snapshot))));
+}
+
+static struct http_reply get_metrics(const struct call *c)
+{
+    struct hub_status s;
+    hub_status(c->hub, &s);
+    const struct metrics_source m = {
+        .uptime_s = s.uptime_s,
+        .snapshot_age_s = s.snapshot_age_s,
+        .simulator = s.simulator,
+        .readings = s.readings,
+        .run = queue_active(hub_queue(c->hub)),
+        .snapshot = s.snapshot,
+    };
+    char *text = metrics_text(&m);
+    if (!text)
+        return fail(500, "out of memory", NULL, "try again");
+    return (struct http_reply){.status = 200, .body = text, .type = METRICS_TYPE};
+}
+
 static struct http_reply get_runs(const struct call *c)
 {
     const struct run *run;
@@ -148,7 +176,7 @@ static struct http_reply get_run(const struct call *c)
 static struct http_reply get_events(const struct call *c)
 {
     (void)c;
-    return (struct http_reply){HTTP_STREAM, NULL, NULL};
+    return reply(HTTP_STREAM, NULL);
 }
 
 // --- commands -----------------------------------------------------------------------------------
@@ -237,6 +265,8 @@ static const struct route {
     const char *allow; // all methods of that path
 } routes[] = {
     {"GET", "/api/v1/status", get_status, "GET"},
+    {"GET", "/api/v1/devices", get_devices, "GET"},
+    {"GET", "/metrics", get_metrics, "GET"},
     {"GET", "/api/v1/runs", get_runs, "GET, POST"},
     {"POST", "/api/v1/runs", post_runs, "GET, POST"},
     {"GET", "/api/v1/runs/", get_run, "GET"},
@@ -268,7 +298,7 @@ struct http_reply api_request(void *hub, const struct http_request *request, uin
     }
     if (!same_path)
         return fail(404, "there is no such resource", request->path,
-                    "see /api/v1/status, /api/v1/runs, /api/v1/events");
+                    "see /api/v1/status, /api/v1/devices, /api/v1/runs, /api/v1/events, /metrics");
     char use[40];
     snprintf(use, sizeof use, "use: %s", same_path->allow);
     struct http_reply r = fail(405, "that method is not for this resource", request->path, use);

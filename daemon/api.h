@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// /api/v1: which request asks the hub for what.
+// /api/v1 and /metrics: which request asks the hub for what.
 //
 //   GET  /api/v1/status          the daemon, the run that has the bench, devices
+//   GET  /api/v1/devices         each device with what its link has seen
+//   GET  /metrics                the same and more for Prometheus
 //   GET  /api/v1/runs            all runs, newest last
 //   GET  /api/v1/runs/N          one, with its last fit
 //   POST /api/v1/runs            {"config": text, "name": path} or {"resume": N or path}: 201

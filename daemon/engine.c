@@ -5,6 +5,8 @@
 #include "campaign/bench.h"
 #include "campaign/config.h"
 #include "campaign/plan.h"
+#include "campaign/plan_states.h"
+#include "campaign/reduce_elements.h"
 #include "campaign/store.h"
 #include "daemon/acquire.h"
 #include "daemon/engine_inside.h"
@@ -126,6 +128,15 @@ static double u_of_mean(double sd, int count)
     return count > 1 ? sd / sqrt(count) : 0.0;
 }
 
+static double analyser(const struct engine *e)
+{
+    double u_rel;
+    const struct bench_config *bench = instrument_bench(e->in);
+    const int in = e->point->pol_in;
+    return reduce_analyser(&bench->polarisation, in, plan_beam_out(e->config, bench, in),
+                           e->point->pol_out, &u_rel);
+}
+
 // Underfilled or overfilled f_r (formulas: campaign/reduce.h) with the opening references; the last
 // word is reduce's.
 static void provisional(const struct engine *e, const struct acquire_reading *r, double theta_i_deg,
@@ -134,15 +145,16 @@ static void provisional(const struct engine *e, const struct acquire_reading *r,
     const struct engine_opening *o = &e->opening;
     const bool monitored = isfinite(r->monitor_v);
     const double signal_v = r->signal_v - o->dark_signal_v;
-    const double beam = (o->beam_signal_v - o->dark_signal_v) /
-                        (monitored ? o->beam_monitor_v - o->dark_monitor_v : 1.0);
+    const int in = e->point->pol_in;
+    const double beam = (o->beam_signal_v[in] - o->dark_signal_v) /
+                        (monitored ? o->beam_monitor_v[in] - o->dark_monitor_v : 1.0);
     const double ratio = signal_v / (monitored ? r->monitor_v - o->dark_monitor_v : 1.0) / beam;
     const double cosine = cos(
         units_rad(instrument_bench(e->in)->regime == BENCH_OVERFILLED ? theta_i_deg : theta_r_deg));
     const double u_signal_v = u_of_mean(r->signal_sd_v, r->count);
     const double u_monitor =
         monitored ? u_of_mean(r->monitor_sd_v, r->count) / (r->monitor_v - o->dark_monitor_v) : 0.0;
-    *ret_f = ratio / (e->omega_sr * cosine);
+    *ret_f = ratio / (e->omega_sr * cosine * analyser(e));
     *ret_u = fabs(*ret_f) * hypot(u_signal_v / signal_v, u_monitor);
 }
 
@@ -150,8 +162,9 @@ static void publish_reading(struct engine *e, const struct acquire_reading *r,
                             const struct travel_pose *at)
 {
     struct engine_event event = event_of(e, ENGINE_READING, NULL);
-    event.theta_i_deg = at->at[PART_THETA_I];
-    event.theta_r_deg = at->at[PART_THETA_R];
+    const struct kinematics_pose pose = kinematics_forward(instrument_kinematics(e->in), at->at);
+    event.theta_i_deg = pose.theta_i;
+    event.theta_r_deg = pose.theta_r;
     event.flags = r->flags;
     if (e->point->kind == PLAN_SAMPLE)
         provisional(e, r, event.theta_i_deg, event.theta_r_deg, &event.f_per_sr, &event.u_per_sr);
@@ -167,9 +180,9 @@ static void remember(struct engine *e, const struct acquire_reading *r)
             e->opening.dark_signal_v = r->signal_v;
             e->opening.dark_monitor_v = r->monitor_v;
         }
-    } else if (e->point->kind == PLAN_BEAM && isnan(e->opening.beam_signal_v)) {
-        e->opening.beam_signal_v = r->signal_v;
-        e->opening.beam_monitor_v = r->monitor_v;
+    } else if (e->point->kind == PLAN_BEAM && isnan(e->opening.beam_signal_v[e->point->pol_in])) {
+        e->opening.beam_signal_v[e->point->pol_in] = r->signal_v;
+        e->opening.beam_monitor_v[e->point->pol_in] = r->monitor_v;
     }
 }
 
@@ -185,13 +198,14 @@ static void begin_pace(struct engine *e)
 static struct store_reading row_of(const struct engine *e, const struct acquire_reading *r,
                                    const struct travel_pose *at)
 {
+    const struct kinematics_pose pose = kinematics_forward(instrument_kinematics(e->in), at->at);
     return (struct store_reading){
         .sweep = e->point->sweep,
         .point = e->point->point,
         .attempt = e->attempt,
         .t_utc_ms = r->utc_ns / 1000000,
-        .theta_i_udeg = (int32_t)units_udeg(at->at[PART_THETA_I]),
-        .theta_r_udeg = (int32_t)units_udeg(at->at[PART_THETA_R]),
+        .theta_i_udeg = (int32_t)units_udeg(pose.theta_i),
+        .theta_r_udeg = (int32_t)units_udeg(pose.theta_r),
         .signal_v = r->signal_v,
         .signal_sd_v = r->signal_sd_v,
         .monitor_v = r->monitor_v,
@@ -225,11 +239,11 @@ static int prepare(struct engine *e)
 static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;
-    struct travel_pose pose = {.at = {p->theta_i_deg, p->theta_r_deg, 0.0}};
-    int rc = 0;
-    if (p->kind == PLAN_DARK && !p->station[0])
-        pose = (struct travel_pose){.at = {(double)NAN, (double)NAN, (double)NAN}};
-    else if (p->kind != PLAN_SAMPLE)
+    struct travel_pose pose = travel_stay();
+    int rc = engine_turn_elements(e);
+    if (rc >= 0 && p->kind == PLAN_SAMPLE)
+        rc = travel_to_sample(e->in, p->theta_i_deg, p->theta_r_deg, &pose, &e->why);
+    else if (rc >= 0 && (p->kind != PLAN_DARK || p->station[0]))
         rc = travel_station(e->in, p->station, &pose, &e->why);
     return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
 }
@@ -418,8 +432,10 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .omega_sr = bench_omega_sr(bench),
         .monitor_dark_v = (double)NAN,
         .monitor_lit_v = (double)NAN,
-        .opening = {(double)NAN, (double)NAN, (double)NAN, (double)NAN},
+        .opening = {.dark_signal_v = (double)NAN, .dark_monitor_v = (double)NAN},
     };
+    for (int i = 0; i < POL_COUNT; i++)
+        e.opening.beam_signal_v[i] = e.opening.beam_monitor_v[i] = (double)NAN;
     if (ports->opening) {
         e.opening = *ports->opening;
         e.monitor_dark_v = e.opening.dark_monitor_v;

@@ -6,6 +6,9 @@
 //   dark (laser off) -> laser on, warm-up -> beam -> sweeps (a fit is asked for after each) -> beam
 //   -> laser off -> dark -> last fit
 //
+// The elements of polarisation stand at a point's states before the directions' axes move; the
+// light may stay on.
+//
 // The laser is on from warm-up to the last beam reading and off on every way out. A device that is
 // gone or does not answer pauses the run in a safe state (emission off where the laser can be
 // reached, axes stopped) and it goes on by itself once the device is back and identified, from the
@@ -15,6 +18,7 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/err.h"
+#include "campaign/polarisation.h"
 #include "daemon/safety.h"
 
 #include <stdbool.h>
@@ -58,11 +62,11 @@ struct engine_event {
     const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
 
-// Means of the opening reference readings, for provisional f_r after a resume; NAN: not measured
-// yet.
+// Means of the opening reference readings, for provisional f_r after a resume, the beam's by the
+// light's state; NAN: not measured yet.
 struct engine_opening {
     double dark_signal_v, dark_monitor_v;
-    double beam_signal_v, beam_monitor_v;
+    double beam_signal_v[POL_COUNT], beam_monitor_v[POL_COUNT];
 };
 
 // While a port waits it calls instrument_breathe at least every 100 ms: the laser's lease.

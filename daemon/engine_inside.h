@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What engine.c (the run), engine_pause.c (the safe state and how it is left) and engine_light.c
-// (the laser's part) share; nobody else includes it.
+// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_light.c (the
+// laser's part) and engine_elements.c (the elements of polarisation) share; nobody else includes
+// it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
@@ -52,6 +53,10 @@ void engine_enter_pause(struct engine *e, const char *text);
 int engine_pause_run(struct engine *e);
 bool engine_pause_asked(struct engine *e);    // true once
 int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
+
+// --- engine_elements.c ---
+// To the point's states; what stands there already is only looked at, now and then.
+int engine_turn_elements(struct engine *e);
 
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.

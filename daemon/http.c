@@ -66,7 +66,7 @@ char *http_error(const char *error, const char *where, const char *what_to_do)
 
 static struct http_reply refuse(int status, const char *error, const char *what_to_do)
 {
-    return (struct http_reply){status, http_error(error, NULL, what_to_do), NULL};
+    return (struct http_reply){.status = status, .body = http_error(error, NULL, what_to_do)};
 }
 
 // --- before the body is read --------------------------------------------------------------------
@@ -122,7 +122,7 @@ static enum MHD_Result send_reply(struct exchange *x)
         return MHD_NO;
     x->reply.body = NULL;
     x->stage = SENT;
-    MHD_add_response_header(r, "Content-Type", "application/json");
+    MHD_add_response_header(r, "Content-Type", x->reply.type ? x->reply.type : "application/json");
     MHD_add_response_header(r, "Cache-Control", "no-store");
     if (x->reply.allow)
         MHD_add_response_header(r, "Allow", x->reply.allow);
@@ -320,7 +320,7 @@ void http_answer(struct http *h, uint64_t ticket, int status, char *body)
 {
     for (struct exchange *x = h->exchanges; x; x = x->next)
         if (x->ticket == ticket && x->stage == WAITING) {
-            x->reply = (struct http_reply){status, body, NULL};
+            x->reply = (struct http_reply){.status = status, .body = body};
             x->stage = ANSWERED;
             MHD_resume_connection(x->connection);
             return;

@@ -30,8 +30,9 @@ enum { HTTP_LATER = 0, HTTP_STREAM = -1 };
 
 struct http_reply {
     int status;        // HTTP status; HTTP_LATER: http_answer will follow; HTTP_STREAM: send events
-    char *body;        // JSON text, malloc'ed, taken over; NULL only with the two special ones
+    char *body;        // text, malloc'ed, taken over; NULL only with the two special ones
     const char *allow; // static text for the Allow header; NULL: none
+    const char *type;  // static text for Content-Type; NULL: application/json
 };
 
 struct http_ports {

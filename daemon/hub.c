@@ -34,6 +34,7 @@ struct hub {
     char last_error[480];
     json_t *put_back; // runs that waited when a stop came, for its answer; NULL: none
     int64_t start_ns;
+    uint64_t readings;          // announced
     uint64_t stops[MOST_STOPS]; // tickets that wait for the end of a stop
     int stop_count;
     bool held; // somebody asked for the pause that the active run is in, or comes to
@@ -114,6 +115,7 @@ static void happened(struct hub *h, const struct note *n)
         json_object_set_new(o, "text", json_string(n->text ? n->text : ""));
         log_say(h->options.log, LOG_NOTICE, "run", "%d: %s", n->run, n->text ? n->text : "");
     } else if (n->event.kind == ENGINE_READING) {
+        h->readings++;
         json_object_set_new(o, "sweep", json_integer(n->sweep)); // the plan's own names for it
         json_object_set_new(o, "point", json_integer(n->point));
         log_say(h->options.log, LOG_INFO, "reading",
@@ -215,14 +217,17 @@ char *hub_submitted(const struct hub *h, int run, uint64_t event_id)
 
 void hub_status(const struct hub *h, struct hub_status *ret_status)
 {
+    const int64_t now_ns = clk_now_ns(clk_system());
     *ret_status = (struct hub_status){
         .directory = h->options.directory,
         .last_error = h->last_error,
         .simulator = h->options.simulator,
         .seed = h->options.seed,
-        .uptime_s = (double)(clk_now_ns(clk_system()) - h->start_ns) / 1e9,
+        .uptime_s = (double)(now_ns - h->start_ns) / 1e9,
         .event_id = events_last_id(h->events),
+        .readings = h->readings,
         .snapshot = h->snapshot,
+        .snapshot_age_s = h->snapshot ? (double)(now_ns - h->snapshot->t_ns) / 1e9 : 0.0,
     };
 }
 

@@ -45,7 +45,9 @@ struct hub_status {
     long seed;
     double uptime_s;
     uint64_t event_id;
+    uint64_t readings;                          // stored in this life of the daemon
     const struct instrument_snapshot *snapshot; // NULL: none yet
+    double snapshot_age_s;
 };
 void hub_status(const struct hub *h, struct hub_status *ret_status);
 const struct queue *hub_queue(const struct hub *h);

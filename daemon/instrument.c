@@ -4,7 +4,7 @@
 #include "campaign/bench.h"
 #include "daemon/instrument_inside.h"
 #include "drivers/bus.h"
-#include "drivers/by_profile.h"
+#include "drivers/device.h"
 #include "drivers/profile.h"
 
 #include <assert.h>
@@ -14,12 +14,7 @@
 #include <string.h>
 
 #define SLICE_NS CLK_MS(100)
-#define BACKOFF_LEAST_NS CLK_MS(200)
-#define BACKOFF_MOST_NS CLK_S(2)
 #define QUIET_MS 100 // the slowest answer of a unit that is to be drained after an error
-
-static const char *const part_names[PART_COUNT] = {"theta_i", "theta_r", "sample", "laser",
-                                                   "detector"};
 
 // --- time -------------------------------------------------------------------------------------
 
@@ -84,12 +79,14 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc, st
             p->returns++;
         p->link = PART_OK;
         p->problem[0] = 0;
-        in->backoff_ns[part] = 0;
+        backoff_reset(&in->retry[part]);
         return rc;
     }
     p->errors++;
     err->code = (enum gon_code)rc;
     gon_prefix(err, "%s%s", part < INSTRUMENT_AXES ? "axis " : "", p->name);
+    snprintf(p->last_error, sizeof p->last_error, "%.*s", (int)sizeof p->last_error - 1, err->text);
+    p->last_error_ns = instrument_now_ns(in);
     if (rc == GON_E_LINK || rc == GON_E_GONE) {
         p->link = PART_LOST;
         snprintf(p->problem, sizeof p->problem, "%.*s", (int)sizeof p->problem - 1, err->text);
@@ -126,22 +123,10 @@ enum instrument_part instrument_lost(const struct instrument *in)
     return part;
 }
 
-static int need_profile(struct instrument *in, struct profile **profile, const char *name,
-                        struct gon_error *err)
-{
-    return *profile ? 0 : profile_open(name, in->bench->folder, profile, err);
-}
-
 static int make_axis(struct instrument *in, struct motor *m, struct bus *bus, struct gon_error *err)
 {
-    int rc = need_profile(in, &m->profile, m->config->driver, err);
-    if (rc < 0)
-        return rc;
-    if (m->profile->role != PROFILE_AXIS || m->profile->protocol != PROFILE_MODBUS)
-        return gon_fail(err, GON_E_INPUT, "the profile %s is not one of an axis on a Modbus bus",
-                        m->profile->name);
-    m->axis = axis_by_profile(m->profile, bus, m->config->unit);
-    return m->axis ? 0 : gon_fail(err, GON_E_SYSTEM, "out of memory");
+    return device_new_axis(m->config->driver, in->bench->folder, &m->profile, bus,
+                           m->config->unit, &m->axis, err);
 }
 
 static int connect_bus(struct instrument *in, struct motor *m, struct gon_error *err)
@@ -171,6 +156,8 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     }
     if (rc < 0)
         return rc;
+    struct part_state *p = &in->part[part];
+    snprintf(p->identity, sizeof p->identity, "unit %d", m->config->unit);
     m->engaged = m->config->backlash <= 0;
     m->commanded = (double)NAN;
     m->seen_ns = INT64_MIN;
@@ -183,9 +170,8 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = need_profile(in, &in->laser_profile, in->bench->laser.driver, err);
-    if (rc == 0)
-        rc = laser_by_profile(in->laser_profile, p->address, &in->breathing.clk, NULL, &laser, err);
+    int rc = device_open_laser(p->driver, in->bench->folder, &in->laser_profile, p->address,
+                               &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
@@ -208,10 +194,8 @@ static int connect_detector(struct instrument *in, struct gon_error *err)
     struct part_state *p = &in->part[PART_DETECTOR];
     int rc = in->detector
                  ? in->detector->ops->reopen(in->detector, err)
-                 : need_profile(in, &in->detector_profile, in->bench->detector.driver, err);
-    if (rc >= 0 && !in->detector)
-        rc = detector_by_profile(in->detector_profile, p->address, &in->breathing.clk, NULL,
-                                 &in->detector, err);
+                 : device_open_detector(p->driver, in->bench->folder, &in->detector_profile,
+                                        p->address, &in->breathing.clk, NULL, &in->detector, err);
     if (rc >= 0)
         rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
     return rc < 0 ? rc : instrument_write_set_up(in, err);
@@ -259,36 +243,50 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     in->laser = (struct laser_status){.power_w = (double)NAN, .setpoint_w = (double)NAN};
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
         in->part[part] =
-            (struct part_state){.name = part_names[part], .link = PART_LOST, .address = ""};
+            (struct part_state){.name = "", .link = PART_LOST, .driver = "", .address = ""};
+    in->part[PART_LASER].name = "laser";
+    in->part[PART_LASER].driver = bench->laser.driver;
+    in->part[PART_DETECTOR].name = "detector";
+    in->part[PART_DETECTOR].driver = bench->detector.driver;
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
-        struct motor *m = &in->motor[part];
-        *m = (struct motor){.config = bench_find_axis(bench, part_names[part]),
-                            .bus = -1,
-                            .commanded = (double)NAN,
-                            .seen_ns = INT64_MIN,
-                            .place = {.position = (double)NAN, .target = (double)NAN}};
-        if (!m->config)
-            in->part[part].link = PART_ABSENT;
+        const bool there = (int)part < bench->axes_count;
+        const double unknown = (double)NAN;
+        in->motor[part] = (struct motor){
+            .config = there ? &bench->axes[part] : NULL,
+            .bus = -1,
+            .commanded = unknown,
+            .seen_ns = INT64_MIN,
+            .place = {
+                .position = unknown, .target = unknown, .dial = unknown, .raw_steps = unknown}};
+        in->part[part].name = there ? bench->axes[part].name : "";
+        in->part[part].driver = there ? bench->axes[part].driver : "";
+        in->part[part].link = there ? PART_LOST : PART_ABSENT;
     }
     return in;
+}
+
+// A part that is not there yet is no error; what it says to a wrong bench file is.
+static int connect_first(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    int rc = instrument_has(in, part) ? instrument_connect(in, part, err) : 0;
+    in->part[part].returns = 0; // it was not away yet
+    return rc == GON_E_INPUT || rc == GON_E_SYSTEM ? rc : 0;
 }
 
 // The laser first: its first bytes are OFF, and nothing moves before.
 static int hand_over(struct instrument *in, struct instrument **ret_instrument,
                      struct gon_error *err)
 {
-    static const enum instrument_part order[PART_COUNT] = {PART_LASER, PART_THETA_I, PART_THETA_R,
-                                                           PART_SAMPLE, PART_DETECTOR};
-    for (int i = 0; i < PART_COUNT; i++) {
-        struct gon_error own;
-        if (!instrument_has(in, order[i]))
-            continue;
-        int rc = instrument_connect(in, order[i], &own);
-        in->part[order[i]].returns = 0; // it was not away yet
-        if (rc == GON_E_INPUT || rc == GON_E_SYSTEM) {
-            instrument_free(in);
-            return gon_fail(err, (enum gon_code)rc, "%s", own.text);
-        }
+    struct gon_error own;
+    int rc = connect_first(in, PART_LASER, &own);
+    for (enum instrument_part part = 0; part < PART_COUNT && rc >= 0; part++)
+        if (part != PART_LASER)
+            rc = connect_first(in, part, &own);
+    if (rc >= 0)
+        rc = bench_kinematics(in->bench, &in->kinematics, &own);
+    if (rc < 0) {
+        instrument_free(in);
+        return gon_fail(err, (enum gon_code)rc, "%s", own.text);
     }
     *ret_instrument = in;
     return 0;
@@ -359,6 +357,23 @@ const struct bench_config *instrument_bench(const struct instrument *in)
     return in->bench;
 }
 
+static const struct link_stats *stats_of(const struct instrument *in, enum instrument_part part)
+{
+    if (!is_part_there(in, part))
+        return NULL;
+    if (part == PART_LASER)
+        return safety_stats(in->safety);
+    if (part == PART_DETECTOR)
+        return in->detector->ops->stats ? in->detector->ops->stats(in->detector) : NULL;
+    const struct axis *a = in->motor[part].axis;
+    return a->ops->stats ? a->ops->stats(a) : NULL;
+}
+
+const struct kinematics *instrument_kinematics(const struct instrument *in)
+{
+    return &in->kinematics;
+}
+
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot)
 {
     struct instrument_snapshot *s = ret_snapshot;
@@ -374,11 +389,18 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
         .time_constant_s = in->time_constant_s,
     };
     memcpy(s->part, in->part, sizeof s->part);
+    for (enum instrument_part part = 0; part < PART_COUNT; part++) {
+        const struct link_stats *stats = stats_of(in, part);
+        if (stats)
+            s->part[part].stats = *stats;
+    }
     for (int i = 0; i < INSTRUMENT_AXES; i++) {
         const struct motor *m = &in->motor[i];
         s->axis[i].unit = m->config ? m->config->unit_name : "";
         s->axis[i].position = m->place.position;
         s->axis[i].target = m->commanded;
+        s->axis[i].dial = m->place.dial;
+        s->axis[i].raw_steps = m->place.raw_steps;
         s->axis[i].moving = m->place.moving;
         s->axis[i].homed = m->place.homed;
         s->axis[i].alarm = m->place.alarm;
@@ -410,14 +432,9 @@ static void ask(struct instrument *in, enum instrument_part part)
 
 static void try_again(struct instrument *in, enum instrument_part part)
 {
-    const int64_t now_ns = instrument_now_ns(in);
-    if (now_ns < in->retry_ns[part] || instrument_connect(in, part, NULL) >= 0)
-        return;
-    int64_t *backoff_ns = &in->backoff_ns[part];
-    *backoff_ns = *backoff_ns ? 2 * *backoff_ns : BACKOFF_LEAST_NS;
-    if (*backoff_ns > BACKOFF_MOST_NS)
-        *backoff_ns = BACKOFF_MOST_NS;
-    in->retry_ns[part] = instrument_now_ns(in) + *backoff_ns;
+    if (backoff_due(&in->retry[part], instrument_now_ns(in)) &&
+        instrument_connect(in, part, NULL) < 0)
+        backoff_failed(&in->retry[part], instrument_now_ns(in));
 }
 
 int instrument_reconnect(struct instrument *in)

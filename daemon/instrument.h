@@ -14,38 +14,40 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/err.h"
+#include "campaign/bench.h"
 #include "daemon/safety.h"
 #include "drivers/axis.h"
 #include "drivers/detector.h"
 #include "drivers/laser.h"
+#include "drivers/link_stats.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-struct bench_config;
-struct bench_axis;
 struct instrument;
 
+// The first parts are the axes, in the order of the bench file: part i is its axes[i].
 enum instrument_part {
-    PART_THETA_I,
-    PART_THETA_R,
-    PART_SAMPLE, // optional
-    PART_LASER,
+    INSTRUMENT_AXES = BENCH_AXES,
+    PART_LASER = INSTRUMENT_AXES,
     PART_DETECTOR,
-    PART_COUNT,
-    INSTRUMENT_AXES = PART_LASER // the first parts are the axes
+    PART_COUNT
 };
 
 enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 
 struct part_state {
-    const char *name;    // "theta_i", "theta_r", "sample", "laser", "detector"
+    const char *name;    // the axis's, "laser", "detector"; "" of an axis the bench has not
     enum part_link link; // PART_ABSENT: the bench has none
+    const char *driver;  // as the bench file names it; "": absent
     const char *address; // of its link; "" when made from ready objects
     char identity[96];   // what it said it is
     char problem[240];   // why it is lost; "" when it is not
     uint64_t errors;     // failed calls since the start
     uint64_t returns;    // times it came back
+    char last_error[240]; // "" when there was none since the start
+    int64_t last_error_ns;
+    struct link_stats stats; // of its link, which others may share; zero without one
 };
 
 // Everything that is known of the bench, as of the last time each part was asked.
@@ -55,6 +57,8 @@ struct instrument_snapshot {
     struct {
         const char *unit;        // "deg", "mm"
         double position, target; // user units; NAN: not known
+        double dial;             // the motor's own scale, campaign/bench.h; NAN: not known
+        double raw_steps;        // of the motor, from the encoder; NAN: not known
         bool moving, homed, alarm;
         int alarm_code;
     } axis[INSTRUMENT_AXES];
@@ -86,6 +90,7 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
 bool instrument_free(struct instrument *in);
 
 const struct bench_config *instrument_bench(const struct instrument *in);
+const struct kinematics *instrument_kinematics(const struct instrument *in);
 void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot);
 // Read back off by a laser that can be reached; nothing else may be called off. Any thread.
 bool instrument_is_dark(const struct instrument_snapshot *s);
@@ -101,7 +106,7 @@ int64_t instrument_now_ns(const struct instrument *in);
 int64_t instrument_utc_ns(const struct instrument *in);
 
 // For an instrument that runs nothing, about once a second: asks every part that is there how it is
-// and tries once to bring back one that is lost (paced, 0.2 to 2 s). Repeats an unconfirmed off.
+// and tries once to bring back one that is lost (paced, 0.1 to 5 s). Repeats an unconfirmed off.
 // Returns the number of parts lost. instrument_reconnect is all of it but the asking.
 int instrument_tend(struct instrument *in);
 int instrument_reconnect(struct instrument *in);
@@ -117,6 +122,7 @@ bool instrument_has(const struct instrument *in, enum instrument_part part);
 
 struct axis_place {
     double position, target; // user units, from the encoder and of the last command
+    double dial, raw_steps;  // the same position, as in the snapshot
     bool moving, in_position, ready, homed, alarm;
     int alarm_code;
     const char *alarm_text;
@@ -134,9 +140,9 @@ int instrument_go(struct instrument *in, enum instrument_part part, double posit
                   struct gon_error *err);
 int instrument_go_home(struct instrument *in, enum instrument_part part, struct gon_error *err);
 int instrument_halt(struct instrument *in, enum instrument_part part, struct gon_error *err);
-// Whether the last moves took up the play so that the load is where the encoder says: it went up by
-// at least the backlash since it last went down, was stopped or was homed. Always true without
-// backlash.
+// Whether the last moves took up the play so that the load is where the encoder says: it went the
+// way of its approach by at least the backlash since it last went the other way, was stopped or was
+// homed. Always true without backlash.
 bool instrument_engaged(const struct instrument *in, enum instrument_part part);
 // The position nearest to the one asked that is a whole number of steps.
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position);

@@ -16,9 +16,14 @@ static int32_t to_steps(const struct bench_axis *c, double position)
     return (int32_t)lround((position - c->zero) * c->steps_per_unit);
 }
 
-static double of_steps(const struct bench_axis *c, int32_t steps)
+static double of_steps(const struct bench_axis *c, double steps)
 {
     return steps / c->steps_per_unit + c->zero;
+}
+
+static double motor_steps(const struct bench_axis *c, int32_t encoder_steps)
+{
+    return c->encoder_steps > 0 ? encoder_steps / c->encoder_steps : encoder_steps;
 }
 
 double instrument_rounded(const struct instrument *in, enum instrument_part part, double position)
@@ -45,9 +50,12 @@ int instrument_place(struct instrument *in, enum instrument_part part, struct ax
     rc = instrument_note(in, part, m->axis->ops->status(m->axis, &s, err), err);
     if (rc < 0)
         return rc;
+    const double raw_steps = motor_steps(m->config, s.position_steps);
     m->place = (struct axis_place){
-        .position = of_steps(m->config, s.position_steps),
+        .position = of_steps(m->config, raw_steps),
         .target = m->commanded,
+        .dial = raw_steps / fabs(m->config->steps_per_unit),
+        .raw_steps = raw_steps,
         .moving = s.moving,
         .in_position = s.in_position,
         .ready = s.ready,
@@ -87,7 +95,7 @@ int instrument_go(struct instrument *in, enum instrument_part part, double posit
     int rc = instrument_need(in, part, err);
     if (rc < 0)
         return rc;
-    const double rise = position - m->place.position;
+    const double rise = (c->approach == BENCH_FROM_ABOVE ? -1 : 1) * (position - m->place.position);
     m->commanded = instrument_rounded(in, part, position);
     m->seen_ns = INT64_MIN;
     if (c->backlash > 0)

@@ -4,6 +4,7 @@
 #pragma once
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
+#include "drivers/backoff.h"
 
 struct bus;
 struct profile;
@@ -28,12 +29,13 @@ struct motor {
 
 struct instrument {
     const struct bench_config *bench;
+    struct kinematics kinematics;
     struct breathing breathing;
     void (*watcher)(void *ctx);
     void *watcher_ctx;
 
     struct part_state part[PART_COUNT];
-    int64_t retry_ns[PART_COUNT], backoff_ns[PART_COUNT];
+    struct backoff retry[PART_COUNT];
 
     struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];

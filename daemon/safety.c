@@ -180,6 +180,11 @@ const char *safety_fault_text(const struct safety *s, int code)
     return text ? text : "no text for it";
 }
 
+const struct link_stats *safety_stats(const struct safety *s)
+{
+    return s->laser->ops->stats ? s->laser->ops->stats(s->laser) : NULL;
+}
+
 enum safety_light safety_light(const struct safety *s)
 {
     return s->emission  ? SAFETY_LIGHT_MAYBE

@@ -24,6 +24,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+struct link_stats;
 struct safety;
 
 // What may be said of the light, and nothing better.
@@ -66,6 +67,7 @@ int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_
 // One short question: whether the laser says that light comes out.
 int safety_look(struct safety *s, bool *ret_emission, struct gon_error *err);
 const char *safety_fault_text(const struct safety *s, int code);
+const struct link_stats *safety_stats(const struct safety *s); // NULL: the laser has no link
 
 enum safety_light safety_light(const struct safety *s);
 // "laser off", or a warning with what to do; one clause, no full stop.

@@ -3,6 +3,7 @@
 
 #include "base/clk.h"
 #include "campaign/catalog.h"
+#include "campaign/plan_states.h"
 #include "campaign/reduce.h"
 #include "campaign/store.h"
 #include "daemon/material.h"
@@ -125,8 +126,12 @@ static int create_file(struct storer *s, const struct campaign_config *config, c
     struct plan plan = {0};
     struct store *store = NULL;
     int id, rc = plan_make(config, s->links.bench, &plan, err);
-    if (rc < 0)
+    if (rc >= 0)
+        rc = plan_check_states(&plan, s->links.bench, err);
+    if (rc < 0) {
+        plan_clear(&plan);
         return rc;
+    }
     struct store_new what = {config, n->text,  n->name, s->links.bench, s->links.bench_text,
                              &plan,  utc_ms(s)};
     rc = catalog_create(s->links.directory, s->highest, &what, &store, &id, err);
@@ -212,7 +217,7 @@ static int same_bench(const struct bench_config *then, const struct bench_config
             "the campaign was begun with polarisation %s, the bench has %s; go on with that bench",
             polarisation_name((enum polarisation)then->laser.polarisation),
             polarisation_name((enum polarisation)now->laser.polarisation));
-    return rc;
+    return rc < 0 ? rc : bench_same_states(&then->polarisation, &now->polarisation, err);
 }
 
 static int read_opening(struct store *store, struct run_material *m, struct gon_error *err)
@@ -222,8 +227,10 @@ static int read_opening(struct store *store, struct run_material *m, struct gon_
     if (count < 0)
         return count;
     struct reduce_reference r = reduce_opening(&m->plan, rows, count);
-    m->opening = (struct engine_opening){r.dark_signal_v, r.dark_monitor_v, r.beam_signal_v,
-                                         r.beam_monitor_v};
+    m->opening = (struct engine_opening){.dark_signal_v = r.dark_signal_v,
+                                         .dark_monitor_v = r.dark_monitor_v};
+    memcpy(m->opening.beam_signal_v, r.beam_signal_v, sizeof r.beam_signal_v);
+    memcpy(m->opening.beam_monitor_v, r.beam_monitor_v, sizeof r.beam_monitor_v);
     m->has_opening = count > 0;
     free(rows);
     return GON_OK;

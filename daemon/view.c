@@ -49,6 +49,8 @@ static void add_axis(json_t *o, const struct instrument_snapshot *s, int part)
     json_object_set_new(o, "unit", json_string(s->axis[part].unit));
     json_object_set_new(o, "position", view_number(s->axis[part].position));
     json_object_set_new(o, "target", view_number(s->axis[part].target));
+    json_object_set_new(o, "dial", view_number(s->axis[part].dial));
+    json_object_set_new(o, "raw_steps", view_number(s->axis[part].raw_steps));
     json_object_set_new(o, "moving", json_boolean(s->axis[part].moving));
     json_object_set_new(o, "homed", json_boolean(s->axis[part].homed));
     json_object_set_new(o, "alarm", json_boolean(s->axis[part].alarm));
@@ -76,6 +78,18 @@ static void add_detector(json_t *o, const struct instrument_snapshot *s)
     json_object_set_new(o, "time_constant_s", view_number(s->time_constant_s));
 }
 
+json_t *view_part(const struct instrument_snapshot *s, int part)
+{
+    json_t *o = json_object();
+    if (part < INSTRUMENT_AXES)
+        add_axis(o, s, part);
+    else if (part == PART_LASER)
+        add_laser(o, s);
+    else
+        add_detector(o, s);
+    return o;
+}
+
 json_t *view_devices(const struct instrument_snapshot *s)
 {
     json_t *all = json_array();
@@ -87,12 +101,7 @@ json_t *view_devices(const struct instrument_snapshot *s)
                               p->link == PART_OK ? "ok" : "lost", "address", p->address, "identity",
                               p->identity, "problem", p->problem, "errors", (json_int_t)p->errors,
                               "returns", (json_int_t)p->returns);
-        if (i < INSTRUMENT_AXES)
-            add_axis(o, s, i);
-        else if (i == PART_LASER)
-            add_laser(o, s);
-        else
-            add_detector(o, s);
+        json_object_update_new(o, view_part(s, i));
         json_array_append_new(all, o);
     }
     return all;

@@ -15,8 +15,10 @@ json_t *view_number(double value); // null unless finite
 json_t *view_run(const struct run *run, bool with_fit);
 
 // [{"name", "link", "address", "identity", "problem", "errors", "returns", then what belongs to
-// it}]
+// it}]; of an axis "unit", "position", "target" (user), "dial", "raw_steps", "moving", "homed",
+// "alarm", "alarm_code"
 json_t *view_devices(const struct instrument_snapshot *s);
+json_t *view_part(const struct instrument_snapshot *s, int part); // what belongs to it alone
 
 json_t *view_flags(unsigned flags); // ["saturated", ...]
 char *view_text(json_t *o);         // one line, malloc'ed; takes the object

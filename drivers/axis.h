@@ -12,6 +12,8 @@
 #include <stdint.h>
 
 struct axis;
+struct bus;
+struct link_stats;
 
 struct axis_status {
     int32_t position_steps; // encoder
@@ -33,6 +35,7 @@ struct axis_ops {
     int (*home)(struct axis *a, struct gon_error *err);
     int (*reset_alarm)(struct axis *a, struct gon_error *err);
     const char *(*alarm_text)(const struct axis *a, int code);
+    const struct link_stats *(*stats)(const struct axis *a); // of its bus; NULL: it has no link
     void (*free)(struct axis *a);
 };
 

@@ -174,6 +174,11 @@ static const char *alarm_text(const struct axis *a, int code)
     return code ? "not in the list of alarms" : "no alarm";
 }
 
+static const struct link_stats *stats(const struct axis *a)
+{
+    return bus_stats(((const struct profiled_axis *)a)->bus);
+}
+
 static void axis_free(struct axis *a)
 {
     session_free(axis_of(a)->s);
@@ -182,8 +187,8 @@ static void axis_free(struct axis *a)
 
 struct axis *axis_by_profile(const struct profile *p, struct bus *bus, int unit)
 {
-    static const struct axis_ops ops = {identify, status,      move_abs,   stop,
-                                        home,     reset_alarm, alarm_text, axis_free};
+    static const struct axis_ops ops = {identify,    status,     move_abs, stop,     home,
+                                        reset_alarm, alarm_text, stats,    axis_free};
     struct profiled_axis *z = calloc(1, sizeof *z);
     if (!z)
         return NULL;

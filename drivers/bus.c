@@ -11,7 +11,7 @@
 
 #define READ_TRIES 3
 #define TIMEOUT_MOST_MS 200
-#define QUIET_MOST_MS 1000
+#define QUIET_MOST_MS 5000
 #define GAP_LEAST_NS 1750000
 #define BUSY_FIRST_NS CLK_MS(10) // doubles
 #define BUSY_MOST_NS CLK_S(1)
@@ -24,7 +24,6 @@ struct bus {
     bool rtu, out_of_step;
     int timeout_ms, quiet_ms;
     int64_t gap_ns, ready_ns; // silence between frames; the next request not before
-    struct bus_stats stats;
     int exception; // of the last answer
 };
 
@@ -39,7 +38,7 @@ struct request {
 // baud).
 static int64_t silent_gap_ns(const struct link *l)
 {
-    if (!l->serial)
+    if (l->kind != LINK_SERIAL)
         return 0;
     const int64_t gap_ns = (int64_t)(3.5 * 11 * 1e9 / l->baud);
     return gap_ns > GAP_LEAST_NS ? gap_ns : GAP_LEAST_NS;
@@ -62,7 +61,7 @@ int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
         return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
     *b = (struct bus){.clk = clk,
                       .cancel = cancel,
-                      .rtu = l.serial,
+                      .rtu = l.kind == LINK_SERIAL,
                       .timeout_ms = timeout_ms,
                       .quiet_ms = quiet_ms,
                       .gap_ns = silent_gap_ns(&l),
@@ -107,7 +106,6 @@ int bus_reopen(struct bus *b, struct gon_error *err)
     int rc = transport_reopen(b->t, err);
     if (rc < 0)
         return rc;
-    b->stats.reopened++;
     b->out_of_step = b->rtu; // another's request may still be under way on the line
     b->ready_ns = clk_now_ns(b->clk);
     return modbus_master_attach(b->master, err);
@@ -117,6 +115,7 @@ int bus_reopen(struct bus *b, struct gon_error *err)
 static int prepare(struct bus *b, struct gon_error *err)
 {
     int rc = 0;
+    transport_book(b->t)->resyncs += b->out_of_step;
     if (b->out_of_step && !b->rtu)
         rc = bus_reopen(b, err);
     else if (b->out_of_step)
@@ -126,9 +125,25 @@ static int prepare(struct bus *b, struct gon_error *err)
     b->out_of_step = false;
     clk_sleep_until(b->clk, b->ready_ns, NULL); // a few milliseconds at most
     rc = transport_drain(b->t, 0, err);
-    if (rc > 0)
-        b->stats.garbled++;
+    transport_book(b->t)->errors[LINK_STRAY] += rc > 0;
     return rc < 0 ? rc : modbus_master_attach(b->master, err);
+}
+
+// Nothing that can be believed came, and something may still come.
+static bool is_untrusted(enum master_outcome o)
+{
+    return o == MASTER_SILENT || o == MASTER_GARBLED || o == MASTER_MISFIT;
+}
+
+static void enter(struct link_stats *book, enum master_outcome o, int64_t latency_ns)
+{
+    book->requests++;
+    book->errors[LINK_SILENT] += o == MASTER_SILENT;
+    book->errors[LINK_GARBLED] += o == MASTER_GARBLED;
+    book->errors[LINK_MISFIT] += o == MASTER_MISFIT;
+    book->errors[LINK_REFUSED] += o != MASTER_DONE && o < MASTER_SILENT;
+    if (o < MASTER_SILENT)
+        link_stats_answer(book, latency_ns);
 }
 
 static enum master_outcome carry_out(struct bus *b, const struct request *r)
@@ -141,17 +156,9 @@ static enum master_outcome carry_out(struct bus *b, const struct request *r)
                                                      r->count, r->ret_registers);
     const int64_t end_ns = clk_now_ns(b->clk);
     b->ready_ns = end_ns + b->gap_ns;
-    b->stats.requests++;
-    b->stats.timeouts += o == MASTER_SILENT;
-    b->stats.garbled += o == MASTER_GARBLED;
-    b->stats.exceptions += o != MASTER_DONE && o < MASTER_SILENT;
-    b->out_of_step = o == MASTER_SILENT || o == MASTER_GARBLED;
+    b->out_of_step = is_untrusted(o);
     b->exception = o < MASTER_SILENT ? (int)o : 0;
-    if (o < MASTER_SILENT) {
-        b->stats.last_latency_ns = end_ns - begin_ns;
-        if (b->stats.last_latency_ns > b->stats.worst_latency_ns)
-            b->stats.worst_latency_ns = b->stats.last_latency_ns;
-    }
+    enter(transport_book(b->t), o, end_ns - begin_ns);
     return o;
 }
 
@@ -243,13 +250,13 @@ int bus_read_table(struct bus *b, int unit, enum bus_table table, int address, i
     for (int i = 0; i < tries; i++) {
         if (i > 0 && cancel_requested(b->cancel))
             return gon_fail(err, GON_E_CANCELED, "%s: stopped", bus_link(b));
-        b->stats.retries += i > 0;
+        transport_book(b->t)->retries += i > 0;
         int rc = attempt(b, &r, &o, err);
         if (rc < 0)
             return rc;
         if (o == MASTER_DONE)
             return 0;
-        if (o != MASTER_SILENT && o != MASTER_GARBLED)
+        if (!is_untrusted(o))
             break;
     }
     return say(b, &r, o, tries, err);
@@ -297,7 +304,7 @@ const char *bus_link(const struct bus *b)
     return transport_link(b->t);
 }
 
-const struct bus_stats *bus_stats(const struct bus *b)
+const struct link_stats *bus_stats(const struct bus *b)
 {
-    return &b->stats;
+    return transport_stats(b->t);
 }

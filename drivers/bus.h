@@ -24,14 +24,10 @@
 #include <stdint.h>
 
 struct bus;
-
-struct bus_stats {
-    uint64_t requests, retries, timeouts, garbled, exceptions, reopened;
-    int64_t last_latency_ns, worst_latency_ns;
-};
+struct link_stats;
 
 // timeout_ms: of one answer, 10..200 (the laser's lease allows no longer silence); quiet_ms: the
-// slowest answer a unit was ever seen to give, 20..1000.
+// slowest answer a unit was ever seen to give, 20..5000.
 int bus_open(const char *link, int timeout_ms, int quiet_ms, struct clk *clk,
              const struct cancel *cancel, struct bus **ret_bus, struct gon_error *err);
 void bus_close(struct bus *b);
@@ -59,4 +55,4 @@ int bus_write(struct bus *b, int unit, int address, int count, const uint16_t *r
 int bus_exception(const struct bus *b);  // code of the last answer; 0: it was none
 int64_t bus_now_ns(const struct bus *b); // of its clock
 const char *bus_link(const struct bus *b);
-const struct bus_stats *bus_stats(const struct bus *b);
+const struct link_stats *bus_stats(const struct bus *b);

@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 struct detector;
+struct link_stats;
 
 // Time until a step of the light has died away to residual (0..1, of the step) behind slope_db / 6
 // equal poles (6, 12, 18, 24 dB per octave), for use with any time constant. 0 for a residual of 1
@@ -55,6 +56,7 @@ struct detector_ops {
     // What happened since clear or the last call, which clears it. Flags of detector_flag.
     int (*condition)(struct detector *d, unsigned *ret_flags, struct gon_error *err);
     int (*reopen)(struct detector *d, struct gon_error *err);
+    const struct link_stats *(*stats)(const struct detector *d); // NULL: it has no link
     void (*free)(struct detector *d);
 };
 

@@ -305,6 +305,11 @@ static int reopen(struct detector *d, struct gon_error *err)
     return rc;
 }
 
+static const struct link_stats *stats(const struct detector *d)
+{
+    return message_stats(session_message(((const struct profiled_detector *)d)->s));
+}
+
 static void detector_free(struct detector *d)
 {
     if (!d)
@@ -337,6 +342,7 @@ int detector_by_profile(const struct profile *p, const char *link, struct clk *c
         .clear = clear,
         .condition = condition,
         .reopen = reopen,
+        .stats = stats,
         .free = detector_free,
     };
     struct session *s;

@@ -15,6 +15,7 @@
 #include <stddef.h>
 
 struct laser;
+struct link_stats;
 
 enum laser_state {
     LASER_OFF,
@@ -53,6 +54,7 @@ struct laser_ops {
     int (*keep_alive)(struct laser *l, struct gon_error *err);
     int (*reopen)(struct laser *l, struct gon_error *err);
     const char *(*fault_text)(struct laser *l, int code);
+    const struct link_stats *(*stats)(const struct laser *l); // NULL: it has no link
     void (*free)(struct laser *l);
 };
 

@@ -280,6 +280,11 @@ static int reopen(struct laser *l, struct gon_error *err)
     return session_reopen(z->s, err);
 }
 
+static const struct link_stats *stats(const struct laser *l)
+{
+    return message_stats(session_message(((const struct profiled_laser *)l)->s));
+}
+
 static void laser_free(struct laser *l)
 {
     if (!l)
@@ -311,6 +316,7 @@ int laser_by_profile(const struct profile *p, const char *link, struct clk *clk,
         .keep_alive = keep_alive,
         .reopen = reopen,
         .fault_text = fault_text,
+        .stats = stats,
         .free = laser_free,
     };
     struct session *s;

@@ -1,31 +1,35 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/link.h"
 
+#include <ctype.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct scheme {
     const char *name;
     enum link_use use;
-    bool serial;
+    enum link_kind kind;
     char parity;
     const char *port; // default
 };
 
 static const struct scheme schemes[] = {
-    {"serial:", LINK_TEXT, true, 'N', NULL},
-    {"tcp:", LINK_TEXT, false, 0, NULL},
-    {"modbus-rtu:", LINK_MODBUS, true, 'E', NULL},
-    {"modbus-tcp:", LINK_MODBUS, false, 0, "502"},
+    {"serial:", LINK_TEXT, LINK_SERIAL, 'N', NULL},
+    {"tcp:", LINK_TEXT, LINK_TCP, 0, NULL},
+    {"usbtmc:", LINK_TEXT, LINK_USBTMC, 0, NULL},
+    {"modbus-rtu:", LINK_MODBUS, LINK_SERIAL, 'E', NULL},
+    {"modbus-tcp:", LINK_MODBUS, LINK_TCP, 0, "502"},
 };
 
 static const char *const forms[] = {
-    [LINK_TEXT] = "serial:/dev/serial/by-id/NAME?baud=115200&parity=N&stop=1 or tcp:HOST:PORT",
+    [LINK_TEXT] = "serial:/dev/serial/by-id/NAME?baud=115200&parity=N&stop=1, tcp:HOST:PORT or "
+                  "usbtmc:VID:PID:SERIAL",
     [LINK_MODBUS] = "modbus-rtu:/dev/serial/by-id/NAME?baud=115200&parity=E&stop=1 or "
                     "modbus-tcp:HOST:PORT",
 };
 
-static const int bauds[] = {1200,  2400,   4800,   9600,   19200,  38400,
+static const int bauds[] = {1200,  2400,   4800,   9600,   19200, 38400,
                             57600, 115200, 230400, 460800, 921600};
 
 static bool copy(char *to, size_t size, const char *from, size_t length)
@@ -143,6 +147,57 @@ static int parse_tcp(const char *text, const char *rest, const char *port, struc
     return 0;
 }
 
+// Four hexadecimal digits; -1: they are not that.
+static int hex_number(const char *text)
+{
+    static const char digits[] = "0123456789abcdef";
+    int value = 0;
+    for (int i = 0; i < 4; i++) {
+        const char *digit = text[i] ? strchr(digits, tolower((unsigned char)text[i])) : NULL;
+        if (!digit)
+            return -1;
+        value = 16 * value + (int)(digit - digits);
+    }
+    return value;
+}
+
+// The serial number is all that follows, colons too; it must be printable and without blanks.
+static bool is_serial_number(const char *text)
+{
+    for (const char *c = text; *c; c++)
+        if (*c <= ' ' || *c > '~')
+            return false;
+    return *text && strlen(text) < sizeof((struct link *)0)->place;
+}
+
+static int parse_usbtmc(const char *text, const char *rest, struct link *l, struct gon_error *err)
+{
+    const int vendor = hex_number(rest);
+    const int product = vendor >= 0 && rest[4] == ':' ? hex_number(rest + 5) : -1;
+    const char *after = product >= 0 ? rest + 9 : "?";
+    if (*after && (*after != ':' || !is_serial_number(after + 1)))
+        return gon_fail(err, GON_E_INPUT,
+                        "link '%s': wants VID:PID or VID:PID:SERIAL, VID and PID of four "
+                        "hexadecimal digits each (lsusb shows them)",
+                        text);
+    l->vendor = (uint16_t)vendor;
+    l->product = (uint16_t)product;
+    if (*after)
+        strcpy(l->place, after + 1);
+    return 0;
+}
+
+static int parse_rest(const struct scheme *s, const char *text, const char *rest, struct link *l,
+                      struct gon_error *err)
+{
+    switch (s->kind) {
+    case LINK_SERIAL: return parse_serial(text, rest, l, err);
+    case LINK_TCP: return parse_tcp(text, rest, s->port, l, err);
+    case LINK_USBTMC: break;
+    }
+    return parse_usbtmc(text, rest, l, err);
+}
+
 int link_parse(const char *text, enum link_use use, struct link *ret_link, struct gon_error *err)
 {
     for (size_t i = 0; i < sizeof schemes / sizeof schemes[0]; i++) {
@@ -150,9 +205,8 @@ int link_parse(const char *text, enum link_use use, struct link *ret_link, struc
         size_t length = strlen(s->name);
         if (s->use != use || strncmp(text, s->name, length) != 0)
             continue;
-        struct link l = {.serial = s->serial, .parity = s->parity};
-        int rc = s->serial ? parse_serial(text, text + length, &l, err)
-                           : parse_tcp(text, text + length, s->port, &l, err);
+        struct link l = {.kind = s->kind, .parity = s->parity};
+        int rc = parse_rest(s, text, text + length, &l, err);
         if (rc == 0)
             *ret_link = l;
         return rc;

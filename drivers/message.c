@@ -51,7 +51,7 @@ struct transport *message_transport(const struct message *m)
     return m->t;
 }
 
-const struct transport_stats *message_stats(const struct message *m)
+const struct link_stats *message_stats(const struct message *m)
 {
     return transport_stats(m->t);
 }
@@ -60,8 +60,13 @@ int message_out_of_step(struct message *m, const char *why)
 {
     (void)why; // the caller's text says it; here it documents the call
     m->out_of_step = true;
-    transport_book(m->t)->garbled++;
+    transport_book(m->t)->errors[LINK_GARBLED]++;
     return GON_E_LINK;
+}
+
+void message_refused(struct message *m)
+{
+    transport_book(m->t)->errors[LINK_REFUSED]++;
 }
 
 // Bytes as a person can read them: what is not printable as \xNN.
@@ -135,12 +140,17 @@ struct span {
     size_t begin, end;
 };
 
+// Where the line ends: at its terminator; where the device says when its message is over, not
+// before that, and then without one too.
 static char *find_end(struct message *m, size_t from)
 {
+    if (transport_framed(m->t) && !transport_ended(m->t))
+        return NULL;
     size_t length = strlen(m->format->end_in);
-    return m->have < from + length
-               ? NULL
-               : memmem(m->in + from, m->have - from, m->format->end_in, length);
+    char *end = m->have < from + length
+                    ? NULL
+                    : memmem(m->in + from, m->have - from, m->format->end_in, length);
+    return !end && transport_framed(m->t) ? m->in + m->have : end;
 }
 
 // Reads on until the line that begins at from is complete.
@@ -152,12 +162,15 @@ static int take_line(struct message *m, const char *command, size_t from, int64_
         if (m->have == sizeof m->in)
             return garbled(m, command, "4096 bytes without an end", 40, err);
         int rc = transport_read(m->t, m->in + m->have, sizeof m->in - m->have, deadline_ns, err);
-        if (rc == GON_E_LINK && m->have > 0) {
-            transport_book(m->t)->timeouts++;
-            return garbled(m, command, "the answer breaks off", m->have, err);
+        if (rc == GON_E_LINK && clk_now_ns(transport_clk(m->t)) < deadline_ns) {
+            message_out_of_step(m, "the link says what was wrong");
+            gon_prefix(err, "'%s'", command);
+            return rc;
         }
+        if (rc == GON_E_LINK && m->have > 0)
+            return garbled(m, command, "the answer breaks off", m->have, err);
         if (rc == GON_E_LINK) {
-            transport_book(m->t)->timeouts++;
+            transport_book(m->t)->errors[LINK_SILENT]++;
             gon_fail(err, rc, "%s: '%s': no answer in %.0f ms", transport_link(m->t), command,
                      (double)m->format->timeout_ns * 1e-6);
         }
@@ -255,6 +268,7 @@ static bool is_printable(const char *bytes, size_t size)
 static int unwanted_echo(struct message *m, const char *command, struct gon_error *err)
 {
     m->out_of_step = true; // the real answer follows
+    transport_book(m->t)->errors[LINK_ECHO]++;
     return gon_fail(err, GON_E_DEVICE, "%s: sends back the command '%s'; turn its echo off",
                     transport_link(m->t), command);
 }
@@ -313,22 +327,22 @@ static int take_answer(struct message *m, const char *command, char *ret_answer,
 static int exchange(struct message *m, const char *command, char *ret_answer, size_t size,
                     struct gon_error *err)
 {
-    struct transport_stats *book = transport_book(m->t);
+    struct link_stats *book = transport_book(m->t);
     int rc = wait_gap(m, err);
     if (rc == 0)
         rc = transport_drain(m->t, 0, err);
     if (rc < 0)
         return rc;
-    book->garbled += rc > 0 && !m->stray;
+    book->errors[LINK_STRAY] += rc > 0 && !m->stray;
     m->stray = false;
     rc = put(m, command, err);
     if (rc < 0)
         return rc;
-    book->queries++;
+    book->requests++;
     const int64_t sent_ns = clk_now_ns(transport_clk(m->t));
     rc = take_answer(m, command, ret_answer, size, err);
     if (rc == 0)
-        transport_latency(m->t, clk_now_ns(transport_clk(m->t)) - sent_ns);
+        link_stats_answer(book, clk_now_ns(transport_clk(m->t)) - sent_ns);
     return rc;
 }
 
@@ -336,6 +350,7 @@ static int get_into_step(struct message *m, struct gon_error *err)
 {
     const struct message_format *f = m->format;
     char answer[COMMAND_MOST];
+    transport_book(m->t)->resyncs++;
     int rc = transport_drain(m->t, f->quiet_ns, err);
     if (rc < 0)
         return rc;
@@ -385,6 +400,7 @@ int message_ask(struct message *m, const char *command,
     struct gon_error why = {0};
     int rc = GON_E_LINK;
     for (int i = 0; i < TRIES && rc == GON_E_LINK; i++) {
+        transport_book(m->t)->retries += i > 0;
         rc = message_query(m, command, answer, sizeof answer, &why);
         if (rc == 0 && read(answer, ctx, &why)) {
             rc = message_out_of_step(m, "not what was asked");

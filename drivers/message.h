@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Question and answer in lines of text over a transport: terminators, echo, a line that says OK,
 // checksums, minimum gap between commands, reassembly of partial lines, a cap on their length
-// (4 KiB), and resynchronisation.
+// (4 KiB), and resynchronisation. Over USB an answer ends where the device says so, with its
+// terminator or without.
 //
 // After any timeout or unreadable answer the link is out of step: a late answer would be taken for
 // the next one's. So the next query first drains until quiet_ns of silence and asks a question
@@ -52,6 +53,8 @@ int message_send(struct message *m, const char *command, struct gon_error *err);
 int message_send_blind(struct message *m, const char *command, bool at_once, struct gon_error *err);
 // The caller saw nonsense; returns GON_E_LINK.
 int message_out_of_step(struct message *m, const char *why);
+void message_refused(
+    struct message *m); // the caller was told "error": entered into the link's book
 int message_reopen(struct message *m, struct gon_error *err); // one try; also gets into step
 
 // A query that may be repeated: up to 3 times while the link fails or read says that the answer is
@@ -65,7 +68,7 @@ int message_ask_text(struct message *m, const char *command, char *ret_text, siz
                      struct gon_error *err);
 
 struct transport *message_transport(const struct message *m);
-const struct transport_stats *message_stats(const struct message *m);
+const struct link_stats *message_stats(const struct message *m);
 
 // A number as instruments write it: optional sign, digits, decimal point, exponent of any length;
 // the whole text but for blanks. A comma, "nan", "inf", 9.9e37 (overflow) or anything left over is

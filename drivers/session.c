@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/session_inside.h"
 
+#include "drivers/message.h"
 #include "drivers/profile_text.h"
 #include "drivers/profile_when.h"
 
@@ -55,6 +56,8 @@ int session_refused(struct session *s, enum profile_meaning means, struct gon_er
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     s->meaning = means;
+    if (session_message(s))
+        message_refused(session_message(s));
     const bool may_change =
         means == PROFILE_BUSY || means == PROFILE_OPEN_INTERLOCK || means == PROFILE_KEY;
     return gon_fail(err, may_change ? GON_E_REFUSED : GON_E_DEVICE, "%s", text);

@@ -1,96 +1,70 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/transport.h"
 
-#include "drivers/link.h"
-#include "drivers/transport_port.h"
+#include "drivers/transport_kind.h"
 
-#include <errno.h>
-#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
-#define SLICE_NS CLK_MS(50)
-#define CONNECT_NS CLK_S(2)
-#define BABBLE_NS CLK_S(2) // a line that is not silent by then says nothing useful
-
-struct transport {
-    struct link link;
-    char *text;
-    struct clk *clk;
-    const struct cancel *cancel;
-    struct serial_port *serial; // NULL: TCP, or closed
-    int fd;                     // -1: closed
-    int64_t turn_ns;            // when the clock last had its turn
-    struct transport_stats stats;
-};
-
-// Errors after which a descriptor never recovers.
-static bool is_gone(int error)
-{
-    switch (error) {
-    case EIO:
-    case ENXIO:
-    case ENODEV:
-    case EBADF:
-    case EPIPE:
-    case ECONNRESET:
-    case ECONNABORTED:
-    case ENOTCONN:
-    case ETIMEDOUT: // of TCP_USER_TIMEOUT and keepalive
-    case EHOSTUNREACH:
-    case ENETDOWN:
-    case ENETUNREACH: return true;
-    default: return false;
-    }
-}
-
-static void shut(struct transport *t)
-{
-    if (t->serial)
-        transport_serial_close(t->serial);
-    else if (t->fd >= 0)
-        close(t->fd);
-    t->serial = NULL;
-    t->fd = -1;
-}
-
-static int reach(struct transport *t, struct gon_error *err)
-{
-    int rc;
-    if (t->link.serial) {
-        rc = transport_serial_open(&t->link, &t->serial, err);
-        if (rc == 0)
-            t->fd = transport_serial_fd(t->serial);
-    } else {
-        rc = transport_tcp_connect(&t->link, t->clk, t->cancel, clk_now_ns(t->clk) + CONNECT_NS,
-                                   err);
-        if (rc >= 0)
-            t->fd = rc;
-    }
-    return rc < 0 ? rc : 0;
-}
-
-int transport_open_parsed(const struct link *link, const char *text, struct clk *clk,
-                          const struct cancel *cancel, struct transport **ret_transport,
-                          struct gon_error *err)
+// Without its kind yet; NULL without memory.
+static struct transport *create(const struct link *link, const char *text, struct clk *clk,
+                                const struct cancel *cancel)
 {
     struct transport *t = calloc(1, sizeof *t);
     char *copy = strdup(text);
     if (!t || !copy) {
         free(t);
         free(copy);
-        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", text);
+        return NULL;
     }
-    *t = (struct transport){.link = *link, .text = copy, .clk = clk, .cancel = cancel, .fd = -1};
-    int rc = reach(t, err);
+    *t = (struct transport){.ops = &transport_stream_ops,
+                            .link = *link,
+                            .text = copy,
+                            .clk = clk,
+                            .cancel = cancel,
+                            .fd = -1};
+    return t;
+}
+
+// Opens what is complete, or takes it apart.
+static int finish(struct transport *t, int rc, struct transport **ret_transport,
+                  struct gon_error *err)
+{
+    if (rc == 0)
+        rc = t->ops->open(t, err);
     if (rc < 0) {
         transport_close(t);
         return rc;
     }
     *ret_transport = t;
     return 0;
+}
+
+int transport_open_parsed(const struct link *link, const char *text, struct clk *clk,
+                          const struct cancel *cancel, struct transport **ret_transport,
+                          struct gon_error *err)
+{
+    struct transport *t = create(link, text, clk, cancel);
+    if (!t)
+        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", text);
+    int rc = 0;
+    if (link->kind == LINK_USBTMC)
+        rc = transport_usbtmc_attach(t, transport_usb_new(&t->link, t->text, clk), err);
+    return finish(t, rc, ret_transport, err);
+}
+
+int transport_open_usb_io(struct usb_io *io, const char *link, struct clk *clk,
+                          const struct cancel *cancel, struct transport **ret_transport,
+                          struct gon_error *err)
+{
+    struct link parsed;
+    int rc = link_parse(link, LINK_TEXT, &parsed, err);
+    struct transport *t = rc == 0 ? create(&parsed, link, clk, cancel) : NULL;
+    if (!t) {
+        io->ops->free(io);
+        return rc < 0 ? rc : gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
+    }
+    return finish(t, transport_usbtmc_attach(t, io, err), ret_transport, err);
 }
 
 int transport_open(const char *link, struct clk *clk, const struct cancel *cancel,
@@ -105,146 +79,66 @@ void transport_close(struct transport *t)
 {
     if (!t)
         return;
-    shut(t);
+    t->ops->shut(t);
+    t->ops->free(t);
     free(t->text);
     free(t);
 }
 
 int transport_reopen(struct transport *t, struct gon_error *err)
 {
-    shut(t);
-    int rc = reach(t, err);
+    t->ops->shut(t);
+    int rc = t->ops->open(t, err);
     t->stats.reopened += rc == 0;
     return rc;
 }
 
 int transport_hung_up(struct transport *t, int error, struct gon_error *err)
 {
-    shut(t);
+    t->ops->shut(t);
+    t->stats.errors[LINK_HUNG_UP]++;
     return gon_fail(err, GON_E_GONE, "%s: %s (%s)", t->text,
-                    t->link.serial ? "unplugged" : "the connection is broken",
+                    t->link.kind == LINK_TCP ? "the connection is broken" : "unplugged",
                     error ? strerror(error) : "hung up");
 }
 
-int transport_slice(int fd, short events, int64_t until_ns, struct clk *clk,
-                    const struct cancel *cancel)
-{
-    int64_t now_ns = clk_now_ns(clk), left_ns = until_ns - now_ns;
-    if (left_ns < 0)
-        left_ns = 0;
-    if (left_ns > SLICE_NS)
-        left_ns = SLICE_NS;
-    struct pollfd p[2] = {{fd, events, 0}, {cancel_fd(cancel), POLLIN, 0}};
-    const struct timespec ts = {0, (long)left_ns};
-    if (ppoll(p, 2, &ts, NULL) < 0 && errno != EINTR)
-        return GON_E_SYSTEM;
-    if (cancel_requested(cancel))
-        return GON_E_CANCELED;
-    if (p[0].revents)
-        return p[0].revents;
-    clk_sleep_until(clk, now_ns, NULL); // nothing came: the clock's turn
-    return 0;
-}
-
-// A line that never falls silent must not take the clock's turn away.
-static void take_turn(struct transport *t)
+void transport_take_turn(struct transport *t)
 {
     int64_t now_ns = clk_now_ns(t->clk);
-    if (now_ns - t->turn_ns < SLICE_NS)
+    if (now_ns - t->turn_ns < TRANSPORT_SLICE_NS)
         return;
     t->turn_ns = now_ns;
     clk_sleep_until(t->clk, now_ns, NULL);
 }
 
-// Waits for events: their revents, 0 at the deadline, or an error.
-static int await(struct transport *t, short events, int64_t deadline_ns, struct gon_error *err)
-{
-    if (t->fd < 0)
-        return gon_fail(err, GON_E_GONE, "%s: not open since it hung up", t->text);
-    for (;;) {
-        take_turn(t);
-        int rc = transport_slice(t->fd, events, deadline_ns, t->clk, t->cancel);
-        if (rc > 0)
-            return rc;
-        if (rc == GON_E_CANCELED)
-            return gon_fail(err, rc, "%s: stopped while waiting", t->text);
-        if (rc < 0)
-            return gon_fail(err, rc, "%s: poll: %s", t->text, strerror(errno));
-        if (clk_now_ns(t->clk) >= deadline_ns)
-            return 0;
-    }
-}
-
-// Bytes moved, 0 when the descriptor has to be waited for again, GON_E_GONE.
-static int moved(struct transport *t, ssize_t n, int revents, struct gon_error *err)
-{
-    if (n > 0)
-        return (int)n;
-    if (n < 0 && (errno == EAGAIN || errno == EINTR) && !(revents & (POLLHUP | POLLERR | POLLNVAL)))
-        return 0;
-    if (n < 0 && errno != EAGAIN && errno != EINTR && !is_gone(errno))
-        return gon_fail(err, GON_E_SYSTEM, "%s: %s", t->text, strerror(errno));
-    return transport_hung_up(t, n < 0 && is_gone(errno) ? errno : 0, err);
-}
-
 int transport_write(struct transport *t, const void *data, size_t size, int64_t deadline_ns,
                     struct gon_error *err)
 {
-    const char *bytes = data;
-    size_t done = 0;
-    while (done < size) {
-        int revents = await(t, POLLOUT, deadline_ns, err);
-        if (revents < 0)
-            return revents;
-        if (revents == 0)
-            return gon_fail(err, GON_E_LINK, "%s: took only %zu of %zu bytes in time", t->text,
-                            done, size);
-        ssize_t n = t->link.serial ? write(t->fd, bytes + done, size - done)
-                                   : send(t->fd, bytes + done, size - done, MSG_NOSIGNAL);
-        int rc = moved(t, n, revents, err);
-        if (rc < 0)
-            return rc;
-        done += (size_t)rc;
-        t->stats.bytes_out += (size_t)rc;
-    }
-    return 0;
+    t->ended = false;
+    return t->ops->write(t, data, size, deadline_ns, err);
 }
 
 int transport_read(struct transport *t, void *data, size_t size, int64_t deadline_ns,
                    struct gon_error *err)
 {
-    for (;;) {
-        int revents = await(t, POLLIN, deadline_ns, err);
-        if (revents < 0)
-            return revents;
-        if (revents == 0)
-            return gon_fail(err, GON_E_LINK, "%s: nothing came in time", t->text);
-        int rc = moved(t, read(t->fd, data, size), revents, err);
-        if (rc > 0)
-            t->stats.bytes_in += (size_t)rc;
-        if (rc)
-            return rc;
-    }
+    t->ended = false;
+    return t->ops->read(t, data, size, deadline_ns, err);
 }
 
 int transport_drain(struct transport *t, int64_t quiet_ns, struct gon_error *err)
 {
-    char waste[1024];
-    const int64_t give_up_ns = clk_now_ns(t->clk) + quiet_ns + BABBLE_NS;
-    int dropped = 0;
-    for (;;) {
-        int revents = await(t, POLLIN, clk_now_ns(t->clk) + quiet_ns, err);
-        if (revents <= 0)
-            return revents < 0 ? revents : dropped;
-        int rc = moved(t, read(t->fd, waste, sizeof waste), revents, err);
-        if (rc < 0)
-            return rc;
-        dropped += rc;
-        t->stats.bytes_in += (size_t)rc;
-        if (clk_now_ns(t->clk) >= give_up_ns)
-            return gon_fail(err, GON_E_LINK, "%s: does not stop sending (%d bytes dropped)",
-                            t->text, dropped);
-    }
+    t->ended = false;
+    return t->ops->drain(t, quiet_ns, err);
+}
+
+bool transport_framed(const struct transport *t)
+{
+    return t->link.kind == LINK_USBTMC;
+}
+
+bool transport_ended(const struct transport *t)
+{
+    return t->ended;
 }
 
 const char *transport_link(const struct transport *t)
@@ -252,7 +146,7 @@ const char *transport_link(const struct transport *t)
     return t->text;
 }
 
-const struct transport_stats *transport_stats(const struct transport *t)
+const struct link_stats *transport_stats(const struct transport *t)
 {
     return &t->stats;
 }
@@ -279,14 +173,7 @@ const struct cancel *transport_cancel(const struct transport *t)
     return t->cancel;
 }
 
-struct transport_stats *transport_book(struct transport *t)
+struct link_stats *transport_book(struct transport *t)
 {
     return &t->stats;
-}
-
-void transport_latency(struct transport *t, int64_t latency_ns)
-{
-    t->stats.last_latency_ns = latency_ns;
-    if (latency_ns > t->stats.worst_latency_ns)
-        t->stats.worst_latency_ns = latency_ns;
 }

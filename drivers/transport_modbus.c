@@ -11,10 +11,12 @@
 #define BYTE_GAP_MS 50
 
 enum { READ_COILS = 1, READ_REGISTERS = 3, WRITE_COIL = 5, WRITE_REGISTER = 6, WRITE_COILS = 15 };
+enum { UNIT_AND_CRC = 3, MBAP = 7, EXCEPTION = 2 }; // bytes around a PDU, and of one
 
 struct modbus_master {
     modbus_t *library;
     struct transport *t;
+    bool rtu;
 };
 
 struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeout_ms)
@@ -30,6 +32,7 @@ struct modbus_master *modbus_master_new(struct transport *t, bool rtu, int timeo
         return NULL;
     }
     m->t = t;
+    m->rtu = rtu;
     modbus_master_set_timeout(m, timeout_ms);
     modbus_set_error_recovery(m->library, MODBUS_ERROR_RECOVERY_NONE);
     return m;
@@ -95,7 +98,19 @@ static enum master_outcome outcome(struct modbus_master *m, int rc)
         transport_hung_up(m->t, 0, NULL);
         return MASTER_GONE;
     }
-    return error == ETIMEDOUT || error == EAGAIN ? MASTER_SILENT : MASTER_GARBLED;
+    if (error == ETIMEDOUT || error == EAGAIN)
+        return MASTER_SILENT;
+    return error == EMBBADCRC ? MASTER_GARBLED : MASTER_MISFIT;
+}
+
+// libmodbus does not say what it moved. What it could not use is not counted as received.
+static void count_bytes(struct modbus_master *m, enum master_outcome o, int request, int answer)
+{
+    struct link_stats *book = transport_book(m->t);
+    const int around = m->rtu ? UNIT_AND_CRC : MBAP;
+    book->bytes_out += (uint64_t)(around + request);
+    if (o < MASTER_SILENT)
+        book->bytes_in += (uint64_t)(around + (o == MASTER_DONE ? answer : EXCEPTION));
 }
 
 static int read_bits(struct modbus_master *m, int function, int address, int count,
@@ -126,9 +141,12 @@ enum master_outcome modbus_master_read(struct modbus_master *m, int unit, int fu
 {
     modbus_set_slave(m->library, unit);
     errno = 0;
-    return outcome(m, function < READ_REGISTERS
-                          ? read_bits(m, function, address, count, ret_registers)
-                          : read_registers(m, function, address, count, ret_registers));
+    const bool bits = function < READ_REGISTERS;
+    const enum master_outcome o =
+        outcome(m, bits ? read_bits(m, function, address, count, ret_registers)
+                        : read_registers(m, function, address, count, ret_registers));
+    count_bytes(m, o, 5, 2 + (bits ? (count + 7) / 8 : 2 * count));
+    return o;
 }
 
 // --- writing -------------------------------------------------------------------------------------
@@ -175,7 +193,7 @@ static enum master_outcome check_echo(const struct modbus_master *m, const uint8
         return (enum master_outcome)pdu[1];
     const bool same = size == header + 5 + crc && (!rtu || answer[0] == request[0]) &&
                       memcmp(pdu, request + 1, 5) == 0;
-    return same ? MASTER_DONE : MASTER_GARBLED;
+    return same ? MASTER_DONE : MASTER_MISFIT;
 }
 
 enum master_outcome modbus_master_write(struct modbus_master *m, int unit, int function,
@@ -188,5 +206,7 @@ enum master_outcome modbus_master_write(struct modbus_master *m, int unit, int f
     int rc = modbus_send_raw_request(m->library, request, size);
     if (rc >= 0)
         rc = modbus_receive_confirmation(m->library, answer);
-    return rc < 0 ? outcome(m, rc) : check_echo(m, request, answer, rc);
+    const enum master_outcome o = rc < 0 ? outcome(m, rc) : check_echo(m, request, answer, rc);
+    count_bytes(m, o, size - 1, 5);
+    return o;
 }

@@ -16,7 +16,8 @@ enum master_outcome {
     MASTER_DONE = 0,
     // 1..11: the exception code of the answer
     MASTER_SILENT = 100, // no answer in time
-    MASTER_GARBLED,      // CRC, length, unit, function or transaction do not fit
+    MASTER_GARBLED,      // its checksum is wrong
+    MASTER_MISFIT,       // length, unit, function or transaction do not fit
     MASTER_GONE          // the transport is closed now
 };
 

@@ -11,7 +11,7 @@ const char *const bench_controllers[] = {"oriental-az", "leadshine-pr", NULL};
 void bench_defaults(struct bench_spec *ret_spec)
 {
     *ret_spec = (struct bench_spec){
-        .steps_per_unit = {1000, 1000, 1000},
+        .steps_per_unit = {1000, 1000, 1000, 1000, 1000},
         .home_speed = 10,
         .home_acceleration = 60,
         .start_s = 0.002,
@@ -68,7 +68,7 @@ void bench_init(struct bench *b, const struct bench_spec *spec, int64_t t_ns)
     }
     for (int i = 0; i < WORLD_AXES; i++) {
         controllers_init(b, spec, (enum world_axis)i);
-        for (int tcp = 0; tcp < 2; tcp++)
+        for (int tcp = 0; tcp < 2 && i < world_axes(&spec->world); tcp++)
             sim_modbus_add(&b->axes_port[tcp], unit_of(b, i));
     }
 }
@@ -77,7 +77,7 @@ struct port *bench_port(struct bench *b, enum bench_port which)
 {
     int tcp = which % 2;
     switch (which) {
-    case BENCH_AXES:
+    case BENCH_AXES_RTU:
     case BENCH_AXES_TCP: return &b->axes_port[tcp].port;
     case BENCH_LASER:
     case BENCH_LASER_TCP: return &b->laser_port[tcp].port;

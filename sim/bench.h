@@ -11,7 +11,7 @@
 #include "sim/world.h"
 
 enum bench_port {
-    BENCH_AXES,
+    BENCH_AXES_RTU,
     BENCH_AXES_TCP,
     BENCH_LASER,
     BENCH_LASER_TCP,
@@ -39,7 +39,7 @@ struct bench_spec {
 struct bench {
     struct world world;
     int controller;
-    struct sim_az az[WORLD_AXES];               // units 1, 2, 3
+    struct sim_az az[WORLD_AXES]; // units 1, 2, 3; 4 and 5 with elements
     struct sim_leadshine leadshine[WORLD_AXES]; // or these
     struct sim_cobolt laser;
     struct sim_sr830 detector;

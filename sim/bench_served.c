@@ -25,7 +25,7 @@ static int open_wires(struct bench_served *b, const struct rundir *dir, struct g
         else
             wire_pty_init(w, bench_port_names[i], bench_port(&b->bench, (enum bench_port)i), path);
         w->enforce = b->config.wire_speed;
-        w->bits = i == BENCH_AXES ? 11 : 10; // 8E1; 8N1
+        w->bits = i == BENCH_AXES_RTU ? 11 : 10; // 8E1; 8N1
     }
     for (int i = 0; i < BENCH_PORTS; i++)
         if (wire_plug(&b->wire[i], err))
@@ -37,7 +37,7 @@ static void write_serial(FILE *out, const void *ctx)
 {
     const struct bench_served *b = ctx;
     char axes[700], laser[700], detector[700];
-    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", b->wire[BENCH_AXES].address,
+    snprintf(axes, sizeof axes, "modbus-rtu:%s?baud=%d&parity=E", b->wire[BENCH_AXES_RTU].address,
              b->config.axes_baud);
     snprintf(laser, sizeof laser, "serial:%s?baud=%d", b->wire[BENCH_LASER].address,
              b->config.laser_baud);
@@ -67,7 +67,7 @@ static int bench_open(struct served *s, const struct rundir *dir, struct gon_err
 static void bench_turn(struct served *s)
 {
     struct bench_served *b = (struct bench_served *)s;
-    b->bench.axes_port[0].gap_ns = wire_char_ns(&b->wire[BENCH_AXES]) * 7 / 2; // 3.5 characters
+    b->bench.axes_port[0].gap_ns = wire_char_ns(&b->wire[BENCH_AXES_RTU]) * 7 / 2; // 3.5 characters
 }
 
 static char *bench_control(struct served *s, const char *line, int64_t t_ns)

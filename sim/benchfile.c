@@ -47,12 +47,49 @@ static void instruments(FILE *out, const struct sim_config *c, const struct benc
     char t[3][32];
     fprintf(out,
             "laser: { driver = \"cobolt-05\"; link = \"%s\"; power_w = %s; warmup_s = %s; "
-            "polarisation = \"u\"; };\n",
-            links->laser, real(t[0], c->power_w), real(t[1], c->bench.world.laser.warmup_s));
+            "polarisation = \"%s\"; };\n",
+            links->laser, real(t[0], c->power_w), real(t[1], c->bench.world.laser.warmup_s),
+            brdf_state_name((enum brdf_state)c->bench.world.elements.laser));
     fprintf(out,
             "detector: { driver = \"sr830\"; link = \"%s\"; time_constant_s = %s; slope_db = %d; "
             "monitor_aux = 1; u_linearity_rel = 0.0; };\n",
             links->detector, real(t[0], c->time_constant_s), c->slope_db);
+}
+
+static void state(FILE *out, enum brdf_state is, const char *axis_name, double at, const char *end)
+{
+    char t[32];
+    fprintf(out, "    { is = \"%s\"; axes = ( { name = \"%s\"; at = %s; } ); }%s\n",
+            brdf_state_name(is), axis_name, real(t, at), end);
+}
+
+// What linear elements make; the polariser out of the beam leaves the laser's own light.
+static void states(FILE *out, const char *side, const char *axis_name, enum brdf_state out_is)
+{
+    static const enum brdf_state is[] = {BRDF_STATE_S, BRDF_STATE_PLUS45, BRDF_STATE_P,
+                                         BRDF_STATE_MINUS45};
+    bool made = false;
+    fprintf(out, "  %s = (\n", side);
+    for (int i = 0; i < 4; i++)
+        made = made || is[i] == out_is;
+    for (int i = 0; i < 4; i++)
+        state(out, is[i], axis_name, 45.0 * i, i < 3 || !made ? "," : "");
+    if (!made)
+        state(out, out_is, axis_name, 270, "");
+    fprintf(out, "  );\n");
+}
+
+// What is known of the elements is what they are: their transmission to 0.2 %.
+static void elements(FILE *out, const struct elements_spec *e)
+{
+    char t[4][32];
+    fprintf(out, "polarisation:\n{\n");
+    states(out, "pol_in", "polariser", (enum brdf_state)e->laser);
+    states(out, "pol_out", "analyser", BRDF_STATE_U);
+    fprintf(out, "  polariser: { extinction = %s; };\n", real(t[0], e->polariser.extinction));
+    fprintf(out, "  analyser: { transmission = %s; u_transmission = %s; extinction = %s; };\n};\n",
+            real(t[1], e->analyser.transmission), real(t[2], 0.002 * e->analyser.transmission),
+            real(t[3], e->analyser.extinction));
 }
 
 void benchfile_write(FILE *out, const struct sim_config *c, const struct benchfile_links *links)
@@ -64,9 +101,15 @@ void benchfile_write(FILE *out, const struct sim_config *c, const struct benchfi
             links->axes);
     axis(out, c, 1, "theta_i", "deg", -5, 88, backlash, ",");
     axis(out, c, 2, "theta_r", "deg", -180, 180, backlash, ",");
-    axis(out, c, 3, "sample", "mm", 0, 30, 0, "");
+    axis(out, c, 3, "sample", "mm", 0, 30, 0, c->bench.world.elements.present ? "," : "");
+    if (c->bench.world.elements.present) {
+        axis(out, c, 4, "polariser", "deg", -10, 280, backlash, ",");
+        axis(out, c, 5, "analyser", "deg", -10, 280, backlash, "");
+    }
     fprintf(out, ");\n");
     instruments(out, c, links);
+    if (c->bench.world.elements.present)
+        elements(out, &c->bench.world.elements);
     fprintf(out,
             "stations: (\n"
             "  { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; sample_mm = 30.0; },\n"

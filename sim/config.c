@@ -54,6 +54,22 @@ static const struct cfg_row optics_rows[] = {
          "of the straight-through path"),
     {0}};
 
+// enum brdf_state
+static const char *const state_names[] = {"u", "s", "p", "+45", "-45", "R", "L", NULL};
+
+static const struct cfg_row polarisation_rows[] = {
+    BOOL("elements", bench.world.elements.present, "false",
+         "a polariser and an analyser on axes, units 4 and 5"),
+    REAL("polariser_transmission", bench.world.elements.polariser.transmission, NULL, 0.01, 1,
+         "0.9", "of light along its axis"),
+    REAL("polariser_extinction", bench.world.elements.polariser.extinction, NULL, 0, 0.5, "1e-5",
+         "crossed light that passes, over parallel"),
+    REAL("analyser_transmission", bench.world.elements.analyser.transmission, NULL, 0.01, 1, "0.9",
+         "of light along its axis"),
+    REAL("analyser_extinction", bench.world.elements.analyser.extinction, NULL, 0, 0.5, "1e-5",
+         "crossed light that passes, over parallel"),
+    {0}};
+
 static const struct cfg_row axes_rows[] = {
     {.name = "controller",
      .type = CFG_CHOICE,
@@ -69,7 +85,7 @@ static const struct cfg_row axes_rows[] = {
          "of the controllers' homing"),
     REAL("steps_per_unit", steps_per_unit, NULL, 1, 1e6, "1000",
          "steps of the motor per degree, or per mm"),
-    REAL("backlash", backlash, "deg", 0, 1, "0.015", "of theta_i and theta_r"),
+    REAL("backlash", backlash, "deg", 0, 1, "0.015", "of the axes that turn"),
     REAL("start_s", bench.start_s, "s", 0, 0.1, "0.002", "from a command to the motor"),
     BOOL("homed", bench.homed, "false", "home is known at power-up"),
     REAL("reply_s", bench.axes_reply_s, "s", 0, 0.2, "0", "the controllers' time to answer"),
@@ -79,6 +95,12 @@ static const struct cfg_row laser_rows[] = {
     REAL("power_w", power_w, "W", 0.001, 10, "0.05", "written into the bench files for goniod"),
     REAL("power_max_w", bench.world.laser.power_max_w, "W", 0.001, 10, "0.1",
          "most that the laser accepts"),
+    {.name = "polarisation",
+     .type = CFG_CHOICE,
+     .offset = AT(bench.world.elements.laser),
+     .fallback = "\"u\"",
+     .help = "state of its light",
+     .choices = state_names},
     REAL("temperatures_s", bench.world.laser.temperatures_s, "s", 0, 600, "20",
          "until its temperatures are right"),
     REAL("warmup_s", bench.world.laser.warmup_s, "s", 0.01, 3600, "240",
@@ -124,6 +146,7 @@ const struct cfg_row sim_config_schema[] = {
     INT("seed", seed, NULL, 0, 2147483647, "1", "of everything random"),
     GROUP("sample", sample_rows, "the sample that the bench measures"),
     GROUP("optics", optics_rows, "geometry between laser, sample and detector"),
+    GROUP("polarisation", polarisation_rows, "elements of polarisation"),
     GROUP("axes", axes_rows, "motors and their controllers"),
     GROUP("laser", laser_rows, "the laser"),
     GROUP("detector", detector_rows, "lock-in amplifier, detector and monitor"),
@@ -300,6 +323,7 @@ void sim_config_finish(struct sim_config *c)
     c->bench.world.seed = (uint64_t)c->seed;
     for (int i = 0; i < WORLD_AXES; i++)
         c->bench.steps_per_unit[i] = c->steps_per_unit;
-    c->bench.world.axis[WORLD_THETA_I].backlash = c->backlash;
-    c->bench.world.axis[WORLD_THETA_R].backlash = c->backlash;
+    for (int i = 0; i < WORLD_AXES; i++)
+        if (i != WORLD_SAMPLE)
+            c->bench.world.axis[i].backlash = c->backlash;
 }

@@ -11,7 +11,7 @@
 struct sim_config {
     struct bench_spec bench;
     int seed;
-    double steps_per_unit, backlash; // of all axes; of theta_i and theta_r
+    double steps_per_unit, backlash; // of all axes; of those that turn
     // what the bench files for goniod say
     double speed, acceleration; // units/s, units/s2
     double power_w;

@@ -9,7 +9,7 @@ static struct bench *the(const struct request *r)
 
 static int the_axis(struct request *r)
 {
-    return request_choice(r, "axis", world_axis_names, WORLD_AXES);
+    return request_choice(r, "axis", world_axis_names, world_axes(&the(r)->world.spec));
 }
 
 // --- what is asked -------------------------------------------------------------------------------
@@ -17,7 +17,7 @@ static int the_axis(struct request *r)
 static json_t *axes_state(const struct request *r)
 {
     json_t *all = json_object();
-    for (int i = 0; i < WORLD_AXES; i++) {
+    for (int i = 0; i < world_axes(&the(r)->world.spec); i++) {
         const struct bench_motor a = bench_motor(the(r), (enum world_axis)i, r->t_ns);
         struct motion_state s = motion_at(&the(r)->world.axis[i], r->t_ns);
         json_object_set_new(all, world_axis_names[i],

@@ -7,7 +7,13 @@
 #define STEPS_PER_TC 8
 #define BACK_TC 60
 
-const char *const world_axis_names[WORLD_AXES] = {"theta_i", "theta_r", "sample"};
+const char *const world_axis_names[WORLD_AXES] = {"theta_i", "theta_r", "sample", "polariser",
+                                                  "analyser"};
+
+int world_axes(const struct world_spec *spec)
+{
+    return spec->elements.present ? WORLD_AXES : WORLD_POLARISER;
+}
 
 // A beam of 50 mW is 0.8 V, below the 1 V range; f = 0.05/sr at theta_r = 45 deg is 23 uV, 500
 // times the noise of 4 nV/rtHz through 12 dB per octave at 1 ms (45 nV).
@@ -23,9 +29,14 @@ void world_defaults(struct world_spec *ret_spec)
                    .transmission = 1,
                    .sample_in_mm = 5,
                    .sample_out_mm = 25},
+        .elements = {.laser = BRDF_STATE_U,
+                     .polariser = {.transmission = 0.9, .extinction = 1e-5},
+                     .analyser = {.transmission = 0.9, .extinction = 1e-5}},
         .axis = {{.min = -10, .max = 95, .start = 2.5, .backlash = 0.015},
                  {.min = -185, .max = 185, .start = -7.5, .backlash = 0.015},
-                 {.min = -2, .max = 35, .start = 1.0, .backlash = 0}},
+                 {.min = -2, .max = 35, .start = 1.0, .backlash = 0},
+                 {.min = -15, .max = 285, .start = 12.0, .backlash = 0.015},
+                 {.min = -15, .max = 285, .start = 21.0, .backlash = 0.015}},
         .laser = {.power_max_w = 0.1,
                   .power_w = 0.01,
                   .temperatures_s = 20,
@@ -82,7 +93,10 @@ static double detected_per_w(struct world *w, int64_t t_ns)
         w->view.plan[i] = w->axis[i].plan;
         w->view.motor0[i] = w->axis[i].motor0;
     }
-    struct optics_scene scene = {at[WORLD_THETA_I], at[WORLD_THETA_R], at[WORLD_SAMPLE], 1};
+    struct elements_view view =
+        elements_view(&w->spec.elements, at[WORLD_POLARISER], at[WORLD_ANALYSER]);
+    struct optics_scene scene = {at[WORLD_THETA_I], at[WORLD_THETA_R], at[WORLD_SAMPLE], 1,
+                                 elements_are_idle(&w->spec.elements) ? NULL : &view};
     double per_w = optics_detected_w(&w->spec.optics, &scene);
     w->view.off = w->spec.optics.off;
     w->view.per_w = rest ? per_w : (double)NAN;

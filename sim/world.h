@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The simulated bench's world: sample, three axes, laser, optics and detector chain, in one struct
-// that is stepped by the times passed in. No I/O, no clock: with the same seed and the same calls
-// at the same times it is the same world, at any speed. Thread: one.
+// The simulated bench's world: sample, three axes (five where the spec has elements of
+// polarisation), laser, optics and detector chain, in one struct that is stepped by the times
+// passed in. No I/O, no clock: with the same seed and the same calls at the same times it is the
+// same world, at any speed. Thread: one.
 //
 // Light is evaluated lazily. world_see brings laser and filter up to a time, in steps of 1/8 time
 // constant and at most 60 time constants back (older input is forgotten by any filter to 1e-20).
@@ -17,10 +18,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum world_axis { WORLD_THETA_I, WORLD_THETA_R, WORLD_SAMPLE, WORLD_AXES };
+enum world_axis {
+    WORLD_THETA_I,
+    WORLD_THETA_R,
+    WORLD_SAMPLE,
+    WORLD_POLARISER, // these two only with elements of polarisation
+    WORLD_ANALYSER,
+    WORLD_AXES
+};
 
 struct world_axis_spec {
-    double min, max; // hard limits: deg, deg, mm
+    double min, max; // hard limits: deg; mm of the sample
     double start;    // where it stands at power-up
     double backlash;
 };
@@ -28,6 +36,7 @@ struct world_axis_spec {
 struct world_spec {
     uint64_t seed;
     struct optics_spec optics;
+    struct elements_spec elements;
     struct world_axis_spec axis[WORLD_AXES];
     struct sim_laser_spec laser;
     double responsivity_v_per_w, offset_v, noise_v_per_rthz; // signal
@@ -52,7 +61,9 @@ struct world {
     bool saturate; // fault injection: the input sees far too much
 };
 
-extern const char *const world_axis_names[WORLD_AXES]; // "theta_i", "theta_r", "sample"
+// "theta_i", "theta_r", "sample", "polariser", "analyser"
+extern const char *const world_axis_names[WORLD_AXES];
+int world_axes(const struct world_spec *spec); // how many of them there are
 
 void world_defaults(struct world_spec *ret_spec); // a painted sample under 50 mW at 1.06 um
 void world_init(struct world *w, const struct world_spec *spec, int64_t t_ns);

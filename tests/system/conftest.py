@@ -58,12 +58,12 @@ def wait_for(true, patience_s=PATIENCE_S):
 class Program:
     """A program whose standard output is read line by line; standard error goes to a file."""
 
-    def __init__(self, argv, log, env=None):
+    def __init__(self, argv, log, env=None, stdin=None):
         self.log = pathlib.Path(log)
         self.argv = [str(a) for a in argv]
         with open(self.log, "ab") as err:
-            self.process = subprocess.Popen(self.argv, stdout=subprocess.PIPE, stderr=err, text=True,
-                                            env={**os.environ, **(env or {})})
+            self.process = subprocess.Popen(self.argv, stdin=stdin, stdout=subprocess.PIPE, stderr=err,
+                                            text=True, env={**os.environ, **(env or {})})
         self.pid = self.process.pid
         self.lines = queue.Queue()
         self.said = []
@@ -247,11 +247,11 @@ class Daemon(Program):
         return control(self.sim_folder() / "control.sock", **command)
 
 
-def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None):
-    """Runs the command to its end: a CompletedProcess with text."""
+def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None, **kwargs):
+    """Runs the command to its end: a CompletedProcess with text. kwargs: as subprocess.run, for another user."""
     return subprocess.run([str(BUILD / "gonio"), *map(str, args)], capture_output=True, text=True,
                           timeout=patience_s, cwd=cwd, input=stdin, check=False,
-                          env={**os.environ, "NO_COLOR": "", **(env or {})})
+                          env={**os.environ, "NO_COLOR": "", **(env or {})}, **kwargs)
 
 
 LONGEST = ["test_paper_campaign", "test_kill", "test_unplug", "test_safety", "test_daemon"]

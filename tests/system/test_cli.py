@@ -23,7 +23,7 @@ def test_help_names_every_verb():
     r = gonio("help")
     assert r.returncode == 0 and r.stderr == ""
     verbs = [line.split()[0] for line in r.stdout.splitlines() if line.startswith("  ")]
-    assert verbs == ["plan", "run", "watch", "status", "stop", "pause", "resume", "list", "show", "fit", "model", "check", "profile"]
+    assert verbs == ["plan", "run", "watch", "status", "devices", "stop", "pause", "resume", "list", "show", "fit", "model", "check", "doctor", "profile"]
     for verb in verbs:
         r = gonio("help", verb)
         assert r.returncode == 0 and f"usage: gonio {verb}" in r.stdout
@@ -63,6 +63,19 @@ def test_plan_of_the_paper():
     assert plan["duration_s"] is None
     kinds = [p["kind"] for p in plan["order"]]
     assert kinds[:2] == ["dark", "beam"] and kinds[-2:] == ["beam", "dark"]
+
+
+def test_plan_shows_the_states_and_what_the_bench_has_not(tmp_path):
+    text = SMALL.replace("theta_i_deg", 'pol_in = ("s", "p"); pol_out = ("u", "s"); theta_i_deg')
+    config = write(tmp_path / "states.cfg", text)
+    r = gonio("plan", config, "--bench", ROOT / "configs" / "goniod.cfg")
+    assert "each sweep in 4 states of polarisation, one after the other: s, s>s, p, p>s" in r.stderr
+    assert 'pol_in = "p", but the bench says that its laser is' in r.stderr
+    plan = json.loads(gonio("plan", config, "--json").stdout)
+    assert plan["states"] == [{"pol_in": i, "pol_out": o} for i in "sp" for o in "us"]
+    assert [(p["kind"], p["pol_in"]) for p in plan["order"][:3]] == [("dark", "s"), ("beam", "s"), ("beam", "p")]
+    first = [p["pol_in"] + p["pol_out"] for p in plan["order"] if p["sweep"] == 1]
+    assert first == sorted(first, key=["su", "ss", "pu", "ps"].index)  # all of one state before the next
 
 
 def test_plan_is_a_table_in_a_pipe():

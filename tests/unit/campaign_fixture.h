@@ -33,6 +33,37 @@
     "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; sample_mm = 30.0; } "  \
     ");\n"
 
+// The same with a polariser in the laser's beam and an analyser before the detector, each on an
+// axis that also takes it out of the beam.
+#define FIXTURE_ELEMENT(name, unit)                                                                \
+    ",\n  { name = \"" name "\"; driver = \"oriental-az\"; bus = \"axes\"; unit = " unit           \
+    "; steps_per_unit = 1000.0;\n"                                                                 \
+    "    min = -10.0; max = 280.0; speed = 20.0; acceleration = 60.0; deadband = 0.003; }"
+#define FIXTURE_STATE(is, name, at)                                                                \
+    "{ is = \"" is "\"; axes = ( { name = \"" name "\"; at = " at "; } ); }"
+#define FIXTURE_STATES                                                                             \
+    "polarisation: {\n"                                                                            \
+    "  pol_in = ( " FIXTURE_STATE(                                                                 \
+        "s", "polariser",                                                                          \
+        "0.0") ",\n"                                                                               \
+               "    " FIXTURE_STATE(                                                               \
+                   "p", "polariser",                                                               \
+                   "90.0") " );\n"                                                                 \
+                           "  pol_out = ( " FIXTURE_STATE(                                         \
+                               "u", "analyser",                                                    \
+                               "270.0") ",\n"                                                      \
+                                        "    " FIXTURE_STATE(                                      \
+                                            "s", "analyser",                                       \
+                                            "0.0") ",\n"                                           \
+                                                   "    " FIXTURE_STATE(                           \
+                                                       "p", "analyser",                            \
+                                                       "90.0") " );\n"                             \
+                                                               "  polariser: { extinction = "      \
+                                                               "0.002; };\n"                       \
+                                                               "  analyser: { transmission = "     \
+                                                               "0.8; u_transmission = 0.008; "     \
+                                                               "extinction = 0.001; };\n};\n"
+
 struct said {
     char text[6000];
     int lines;
@@ -51,6 +82,29 @@ static inline struct bench_config fixture_bench(void)
     struct bench_config b;
     if (bench_config_parse(FIXTURE_BENCH, "bench.cfg", (struct cfg_sink){0}, &b) < 0)
         abort();
+    return b;
+}
+
+static inline char *fixture_polarised_text(char *text, size_t size)
+{
+    static const char end[] = " } );\nlaser"; // of the axes
+    const char *at = strstr(FIXTURE_BENCH, end);
+    snprintf(text, size, "%.*s }%s%s%s%s", (int)(at - FIXTURE_BENCH), FIXTURE_BENCH,
+             FIXTURE_ELEMENT("polariser", "4"), FIXTURE_ELEMENT("analyser", "5"), at + 2,
+             FIXTURE_STATES);
+    return text;
+}
+
+static inline struct bench_config fixture_polarised_bench(void)
+{
+    struct bench_config b;
+    struct said said = {0};
+    char text[4000];
+    if (bench_config_parse(fixture_polarised_text(text, sizeof text), "bench.cfg",
+                           (struct cfg_sink){fixture_say, &said}, &b) < 0) {
+        fputs(said.text, stderr);
+        abort();
+    }
     return b;
 }
 

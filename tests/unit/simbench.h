@@ -8,12 +8,18 @@
 #include "drivers/axis.h"
 #include "drivers/detector.h"
 #include "drivers/laser.h"
+#include "drivers/link_stats.h"
 #include "sim/world.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+// simconfig's axes are the world's, in its order.
+#define PART_THETA_I ((enum instrument_part)WORLD_THETA_I)
+#define PART_THETA_R ((enum instrument_part)WORLD_THETA_R)
+#define PART_SAMPLE ((enum instrument_part)WORLD_SAMPLE)
 
 enum simbench_device { SIMBENCH_AXES, SIMBENCH_LASER, SIMBENCH_DETECTOR, SIMBENCH_DEVICES };
 
@@ -36,9 +42,10 @@ struct simbench_axis {
 struct simbench {
     struct clk_virtual clk;
     struct world world;
-    struct simbench_axis axis[INSTRUMENT_AXES];
+    struct simbench_axis axis[WORLD_AXES];
     struct laser laser;
     struct detector detector;
+    struct link_stats bus; // as the axes' bus would keep it; the others have no link
     int range;
     double step_delay_s; // virtual time each call costs
 
@@ -186,6 +193,11 @@ static inline const char *simbench_alarm_text(const struct axis *a, int code)
 {
     (void)a;
     return code == 0x30 ? "overload" : "";
+}
+
+static inline const struct link_stats *simbench_axis_stats(const struct axis *a)
+{
+    return &((const struct simbench_axis *)a)->bench->bus;
 }
 
 static inline void simbench_axis_free(struct axis *a)
@@ -410,12 +422,13 @@ static inline void simbench_detector_free(struct detector *d)
     (void)d;
 }
 
-// A world with its devices, at t = 1 s. Change spec's defaults through tune (may be NULL).
-static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
+// A world with its devices, at t = 1 s.
+static inline void simbench_init_world(struct simbench *b, const struct world_spec *spec)
 {
     static const struct axis_ops axis_ops = {
-        simbench_axis_identify, simbench_axis_status, simbench_axis_move,  simbench_axis_stop,
-        simbench_axis_home,     simbench_axis_reset,  simbench_alarm_text, simbench_axis_free};
+        simbench_axis_identify, simbench_axis_status, simbench_axis_move,
+        simbench_axis_stop,     simbench_axis_home,   simbench_axis_reset,
+        simbench_alarm_text,    simbench_axis_stats,  simbench_axis_free};
     static const struct laser_ops laser_ops = {.identify = simbench_laser_identify,
                                                .status = simbench_laser_status,
                                                .emission = simbench_laser_emission,
@@ -435,23 +448,29 @@ static inline void simbench_init(struct simbench *b, void (*tune)(struct world_s
                                                      .condition = simbench_detector_condition,
                                                      .reopen = simbench_detector_reopen,
                                                      .free = simbench_detector_free};
-    struct world_spec spec;
     *b = (struct simbench){
         .laser = {&laser_ops}, .detector = {&detector_ops}, .gone_for_ns = CLK_S(3)};
     clk_virtual_init(&b->clk, CLK_S(1), CLK_S(1700000000));
+    world_init(&b->world, spec, b->clk.t_ns);
+    for (int i = 0; i < WORLD_AXES; i++)
+        b->axis[i] = (struct simbench_axis){
+            .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
+}
+
+// The same of the defaults, changed through tune (may be NULL).
+static inline void simbench_init(struct simbench *b, void (*tune)(struct world_spec *spec))
+{
+    struct world_spec spec;
     world_defaults(&spec);
     if (tune)
         tune(&spec);
-    world_init(&b->world, &spec, b->clk.t_ns);
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
-        b->axis[i] = (struct simbench_axis){
-            .axis = {&axis_ops}, .bench = b, .which = (enum world_axis)i, .steps_per_unit = 1000.0};
+    simbench_init_world(b, &spec);
 }
 
 static inline struct instrument_parts simbench_parts(struct simbench *b)
 {
     struct instrument_parts parts = {.laser = &b->laser, .detector = &b->detector};
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < world_axes(&b->world.spec); i++)
         parts.axis[i] = &b->axis[i].axis;
     return parts;
 }

@@ -15,8 +15,10 @@ static inline void simconfig_axis(struct bench_axis *a, const char *name, const 
                              .speed = 20,
                              .acceleration = 60,
                              .backlash = 0.02,
-                             .deadband = 0.003};
+                             .deadband = 0.003,
+                             .retries = 2};
     snprintf(a->name, sizeof a->name, "%s", name);
+    snprintf(a->driver, sizeof a->driver, "oriental-az");
     snprintf(a->unit_name, sizeof a->unit_name, "%s", unit);
 }
 
@@ -37,6 +39,8 @@ static inline void simconfig_bench(struct bench_config *b)
     simconfig_axis(&b->axes[1], "theta_r", "deg", -180, 180);
     simconfig_axis(&b->axes[2], "sample", "mm", 0, 30);
     b->axes[2].backlash = 0;
+    snprintf(b->laser.driver, sizeof b->laser.driver, "cobolt-05");
+    snprintf(b->detector.driver, sizeof b->detector.driver, "sr830");
     b->laser.power_w = 0.05;
     b->laser.warmup_s = 60;
     b->detector.time_constant_s = 0.1;

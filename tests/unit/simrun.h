@@ -261,14 +261,13 @@ static inline void quick_laser(struct world_spec *spec)
     spec->laser.warmup_s = 5;
 }
 
-static inline struct run *begin(void (*tune)(struct world_spec *spec))
+static inline struct run *begin_on(const struct world_spec *spec, const struct bench_config *bench)
 {
     struct run *r = calloc(1, sizeof *r);
-    simbench_init(&r->b, tune ? tune : quick_laser);
+    simbench_init_world(&r->b, spec);
     r->b.clk.on_advance = advanced;
     r->b.clk.ctx = r;
-    simconfig_bench(&r->bench);
-    r->bench.laser.warmup_s = 5;
+    r->bench = *bench;
     r->config.readings = 4;
     r->config.dark_readings = 8;
     r->config.beam_readings = 8;
@@ -285,6 +284,18 @@ static inline struct run *begin(void (*tune)(struct world_spec *spec))
                                      .take_pause = port_pause};
     struct instrument_parts parts = simbench_parts(&r->b);
     assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
+    return r;
+}
+
+static inline struct run *begin(void (*tune)(struct world_spec *spec))
+{
+    struct world_spec spec;
+    struct bench_config bench;
+    world_defaults(&spec);
+    (tune ? tune : quick_laser)(&spec);
+    simconfig_bench(&bench);
+    bench.laser.warmup_s = 5;
+    struct run *r = begin_on(&spec, &bench);
     small_plan(r);
     return r;
 }
@@ -297,7 +308,7 @@ static inline enum run_state go(struct run *r)
         print_error("failed: %s\n", err.text);
     if (emits(r) && laser_reachable(r))
         violate(r, "laser on after the end");
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < WORLD_AXES; i++)
         if (motion_at(&r->b.world.axis[i], r->b.clk.t_ns + CLK_S(1)).moving)
             violate(r, "an axis moves after the end");
     return s;

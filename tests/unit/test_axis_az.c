@@ -48,7 +48,7 @@ static struct axis *begin(int unit)
     spec.axes_reply_s = 0.001;
     bench_init(&bench, &spec, CLK_S(1));
     memset(&tap, 0, sizeof tap);
-    noisy_init(&tap.line, bench_port(&bench, BENCH_AXES), 7, 0);
+    noisy_init(&tap.line, bench_port(&bench, BENCH_AXES_RTU), 7, 0);
     tap.line.port.ops = &ops;
     struct clk *clk = vline_begin(&tap.line.port);
     if (bus_open(vline.bus, 50, 100, clk, NULL, &bus, &err) < 0)
@@ -155,7 +155,7 @@ static void a_move_whose_answer_was_lost_is_not_repeated(void **state)
     (void)state;
     struct axis *a = begin(2);
     const uint64_t before = bench.az[1].moves;
-    bench_port(&bench, BENCH_AXES)->drop = 1;
+    bench_port(&bench, BENCH_AXES_RTU)->drop = 1;
     assert_int_equal(a->ops->move_abs(a, 5000, 20000, 60000, &err), GON_E_LINK);
     assert_int_equal(tap.frames, 1);
     assert_int_equal(bench.az[1].moves, before + 1);
@@ -173,7 +173,7 @@ static void stop_stops_and_takes_its_bit_back(void **state)
     for (unsigned drop = 0; drop < 3; drop++) {
         assert_int_equal(a->ops->move_abs(a, drop % 2 ? -50000 : 50000, 20000, 60000, NULL), 0);
         run_for(0.5);
-        bench_port(&bench, BENCH_AXES)->drop = drop;
+        bench_port(&bench, BENCH_AXES_RTU)->drop = drop;
         assert_int_equal(a->ops->stop(a, NULL), 0);
         assert_int_equal(bench.az[1].input, 0);
         run_for(1);
@@ -190,11 +190,11 @@ static void a_bit_left_behind_is_cleared_before_the_next_command(void **state)
     struct gon_error err;
     (void)state;
     struct axis *a = begin(2);
-    bench_port(&bench, BENCH_AXES)->mute = true;
+    bench_port(&bench, BENCH_AXES_RTU)->mute = true;
     tap.line.one_in = 0;
     assert_int_equal(a->ops->stop(a, &err), GON_E_LINK);
     bench.az[1].input = 1 << 5; // as if only the setting had arrived
-    bench_port(&bench, BENCH_AXES)->mute = false;
+    bench_port(&bench, BENCH_AXES_RTU)->mute = false;
     const uint64_t before = bench.az[1].moves;
     assert_int_equal(a->ops->move_abs(a, 1000, 20000, 60000, &err), 0);
     assert_int_equal(bench.az[1].input, 0);
@@ -223,7 +223,7 @@ static void homing_is_commanded_once_whatever_happens(void **state)
     (void)state;
     struct axis *a = begin(2);
     const uint64_t before = bench.az[1].moves;
-    bench_port(&bench, BENCH_AXES)->drop = 1;
+    bench_port(&bench, BENCH_AXES_RTU)->drop = 1;
     assert_int_equal(a->ops->home(a, &err), GON_E_LINK);
     assert_int_equal(bench.az[1].moves, before + 1);
     assert_int_equal(bench.az[1].input, 0);

@@ -37,7 +37,7 @@ static struct axis *begin(int make)
     spec.controller = make;
     spec.axes_reply_s = 0.001;
     bench_init(&bench, &spec, CLK_S(1));
-    noisy_init(&line, bench_port(&bench, BENCH_AXES), SEED, 0);
+    noisy_init(&line, bench_port(&bench, BENCH_AXES_RTU), SEED, 0);
     struct clk *clk = vline_begin(&line.port);
     if (bus_open(vline.bus, 50, 100, clk, NULL, &bus, &err) < 0)
         fail_msg("%s", err.text);

@@ -100,7 +100,10 @@ static void registers_are_read_and_written(void **state)
     assert_int_equal(bus_write(b, 1, 5, 2, (const uint16_t[]){7, 8}, NULL), 0);
     assert_int_equal(slave.registers[0][6], 8);
     assert_int_equal(bus_stats(b)->requests, 2);
-    assert_int_equal(bus_stats(b)->last_latency_ns, MS(2));
+    assert_int_equal(bus_stats(b)->latency_last_ns, MS(2));
+    assert_int_equal(bus_stats(b)->bytes_out, 8 + 13);
+    assert_int_equal(bus_stats(b)->bytes_in, 11 + 8);
+    assert_int_equal(link_stats_failures(bus_stats(b)), 0);
     bus_close(b);
 }
 
@@ -142,7 +145,7 @@ static void wrong_settings_are_refused(void **state)
     struct clk *clk = vline_begin(&slave.m.port);
     assert_int_equal(bus_open(vline.bus, 9, 350, clk, NULL, &b, &err), GON_E_INPUT);
     assert_int_equal(bus_open(vline.bus, 201, 350, clk, NULL, &b, &err), GON_E_INPUT);
-    assert_int_equal(bus_open(vline.bus, 100, 1001, clk, NULL, &b, &err), GON_E_INPUT);
+    assert_int_equal(bus_open(vline.bus, 100, 5001, clk, NULL, &b, &err), GON_E_INPUT);
     assert_int_equal(bus_open(vline.link, 100, 350, clk, NULL, &b, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "modbus-rtu:"));
     assert_null(b);
@@ -158,12 +161,12 @@ static void a_slow_unit_is_given_its_time(void **state)
     bus_expect(b, 20, 20);
     slave.m.port.delay_ns = MS(140);
     assert_int_equal(bus_read(b, 1, 0, 4, r, NULL), 0);
-    assert_int_equal(bus_stats(b)->timeouts, 0);
+    assert_int_equal(bus_stats(b)->errors[LINK_SILENT], 0);
     bus_expect(b, 500, 5000); // but nobody is waited for without end
     slave.m.port.drop = 1;
     const int64_t start_ns = vline.clk.t_ns;
     assert_int_equal(bus_read(b, 1, 0, 4, r, NULL), 0);
-    assert_in_range(vline.clk.t_ns - start_ns, MS(1200), MS(1210));
+    assert_in_range(vline.clk.t_ns - start_ns, MS(5200), MS(5210));
     bus_close(b);
 }
 
@@ -182,7 +185,7 @@ static void exceptions_name_function_address_and_count(void **state)
     slave.exceptions_left = 1;
     assert_int_equal(bus_write(b, 2, 0, 1, r, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "exception 4; function 16"));
-    assert_int_equal(bus_stats(b)->exceptions, 2);
+    assert_int_equal(bus_stats(b)->errors[LINK_REFUSED], 2);
     bus_close(b);
 }
 
@@ -229,7 +232,7 @@ static void a_lost_answer_repeats_reads_but_never_writes(void **state)
     slave.m.port.drop = 2;
     assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
     assert_int_equal(bus_stats(b)->retries, 2);
-    assert_int_equal(bus_stats(b)->timeouts, 2);
+    assert_int_equal(bus_stats(b)->errors[LINK_SILENT], 2);
 
     slave.m.port.drop = 1;
     assert_int_equal(bus_write(b, 1, 0, 1, (const uint16_t[]){77}, &err), GON_E_LINK);
@@ -267,7 +270,7 @@ static void what_comes_unasked_is_dropped_before_a_request(void **state)
     port_send(&slave.m.port, "\1\3\4\0", 4, vline.clk.t_ns);
     assert_int_equal(bus_read(b, 1, 0, 2, r, NULL), 0);
     assert_int_equal(r[0], 1000);
-    assert_int_equal(bus_stats(b)->garbled, 1);
+    assert_int_equal(bus_stats(b)->errors[LINK_STRAY], 1);
     assert_int_equal(bus_stats(b)->retries, 0);
     bus_close(b);
 }
@@ -300,7 +303,7 @@ static void feed_forged(struct port *p, const uint8_t *bytes, size_t size, int64
     }
 }
 
-static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error)
+static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error, enum link_error kind)
 {
     static const struct port_ops ops = {feed_forged, scripted_nothing, scripted_hangup};
     struct port p;
@@ -316,17 +319,21 @@ static void check_forged(const uint8_t *pdu, size_t size, uint16_t crc_error)
     assert_int_equal(r[0], 1000);
     assert_int_equal(r[1], 1001);
     assert_int_equal(bus_stats(b)->retries, 1);
+    assert_int_equal(bus_stats(b)->resyncs, 1);
+    assert_int_equal(bus_stats(b)->errors[kind], 1);
+    assert_int_equal(link_stats_failures(bus_stats(b)), 1);
+    assert_int_equal(link_stats_answers(bus_stats(b)), 1);
     bus_close(b);
 }
 
 static void wrong_unit_function_length_or_checksum_is_no_answer(void **state)
 {
     (void)state;
-    check_forged((const uint8_t[]){2, 3, 4, 0, 9, 0, 9}, 7, 0);
-    check_forged((const uint8_t[]){1, 4, 4, 0, 9, 0, 9}, 7, 0);
-    check_forged((const uint8_t[]){1, 3, 2, 0, 9}, 5, 0);
-    check_forged((const uint8_t[]){1, 3, 6, 0, 9, 0, 9, 0, 9}, 9, 0);
-    check_forged((const uint8_t[]){1, 3, 4, 0, 9, 0, 9}, 7, 0x0100);
+    check_forged((const uint8_t[]){2, 3, 4, 0, 9, 0, 9}, 7, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 4, 4, 0, 9, 0, 9}, 7, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 3, 2, 0, 9}, 5, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 3, 6, 0, 9, 0, 9, 0, 9}, 9, 0, LINK_MISFIT);
+    check_forged((const uint8_t[]){1, 3, 4, 0, 9, 0, 9}, 7, 0x0100, LINK_GARBLED);
 }
 
 // --- the other functions, as the Application Protocol 1.1b3 (6.1 to 6.12) shows them
@@ -465,6 +472,7 @@ static void a_hang_up_is_gone_and_a_new_plug_works(void **state)
     slave.m.port.mute = false;
     assert_int_equal(bus_reopen(b, &err), 0);
     assert_int_equal(bus_read(b, 1, 0, 2, r, &err), 0);
+    assert_int_equal(bus_stats(b)->errors[LINK_HUNG_UP], 1);
     assert_int_equal(bus_stats(b)->reopened, 1);
     bus_close(b);
 }
@@ -580,7 +588,7 @@ static void tcp_reconnects_after_a_late_answer(void **state)
     assert_int_equal(bus_read(b, 2, 10, 4, r, &err), 0);
     assert_int_equal(r[3], 2013);
     assert_int_equal(bus_stats(b)->reopened, 1);
-    assert_int_equal(bus_stats(b)->timeouts, 1);
+    assert_int_equal(bus_stats(b)->errors[LINK_SILENT], 1);
     assert_int_equal(bus_read(b, 1, 20, 2, r, &err), 0);
     assert_int_equal(r[1], 1021);
     assert_int_equal(bus_stats(b)->reopened, 1);

@@ -34,6 +34,7 @@ struct target {
     double weight;
     struct axis axes[2];
     int axes_count;
+    int words[3], words_count;
 };
 
 static const char *const methods[] = {"memetic", "paper", NULL};
@@ -54,6 +55,8 @@ static const struct cfg_row axis_rows[] = {
 static const struct cfg_row campaign_rows[] = {
     {"name", CFG_STRING, .offset = AT(name), .size = 8, .fallback = "\"x\""},
     {"method", CFG_CHOICE, .offset = AT(method), .choices = methods, .fallback = "\"paper\""},
+    {"words", CFG_CHOICES, .offset = AT(words), .size = 3, .count_offset = AT(words_count),
+     .choices = methods, .fallback = "\"paper\""},
     {"theta_i_deg", CFG_REALS, .offset = AT(angles_deg), .size = 4,
      .count_offset = AT(angles_count), .unit = "deg", .max = 85, .help = "Angles of incidence."},
     {"theta_r", CFG_GROUP, .offset = AT(scan), .rows = scan_rows},
@@ -119,6 +122,7 @@ static void a_small_file_gets_all_defaults(void **state)
     assert_int_equal(t.scan.count, -3);
     assert_true(t.dense);
     assert_int_equal(t.axes_count, 0);
+    assert_true(t.words_count == 1 && t.words[0] == 1);
 }
 
 static void every_kind_of_value_arrives(void **state)
@@ -218,6 +222,30 @@ static void lists_have_lengths(void **state)
               "instead\n");
     complains(GOOD "axes = ( { name = \"a\"; }, { name = \"b\"; }, { name = \"c\"; } );",
               "c.cfg:2: axes = ( ... ): 3 groups; at most 2 are allowed\n");
+}
+
+static void lists_of_words_are_checked_word_by_word(void **state)
+{
+    (void)state;
+    struct heard h;
+    struct target t;
+#define WORDS(list) "campaign: { theta_i_deg = 5; theta_r: { from_deg = 0; }; words = " list "; };"
+    assert_int_equal(take(WORDS("(\"paper\", \"memetic\")"), &t, &h), 0);
+    assert_true(t.words_count == 2 && t.words[0] == 1 && t.words[1] == 0);
+    assert_int_equal(take(WORDS("[\"memetic\"]"), &t, &h), 0);
+    assert_true(t.words_count == 1 && t.words[0] == 0);
+    assert_int_equal(take(WORDS("\"memetic\""), &t, &h), 0);
+    assert_true(t.words_count == 1 && t.words[0] == 0);
+    complains(WORDS("(\"paper\", \"papr\", 3)"),
+              "c.cfg:1: campaign.words[1] = \"papr\": unknown; allowed \"memetic\", \"paper\"; did "
+              "you mean \"paper\"?\n"
+              "c.cfg:1: campaign.words[2] = 3: not a text in double quotes; allowed \"memetic\", "
+              "\"paper\"\n");
+    complains(WORDS("()"),
+              "c.cfg:1: campaign.words = ( ... ): an empty list; give at least one word\n");
+    complains(WORDS("(\"paper\", \"paper\", \"paper\", \"paper\")"),
+              "c.cfg:1: campaign.words = ( ... ): 4 words; at most 3 are allowed\n");
+#undef WORDS
 }
 
 static void strings_are_utf8_and_never_cut(void **state)
@@ -321,6 +349,8 @@ static void the_table_describes_itself(void **state)
                                  "given\n\tAngles of incidence.\n\n"));
     assert_non_null(
         strstr(text, "*campaign.method*: one of \"memetic\", \"paper\", default \"paper\"\n"));
+    assert_non_null(strstr(text, "*campaign.words*: one or a list of \"memetic\", \"paper\", "
+                                 "default \"paper\"\n"));
     assert_non_null(strstr(text, "*axes[].speed*: number, deg/s, at least 0, default 20\n"));
     free(text);
 }
@@ -405,6 +435,44 @@ static void their_mistakes_are_said(void **state)
     assert_non_null(strstr(h.text, "4 texts; at most 3 are allowed"));
 }
 
+static void pairs_are_lists_of_two(void **state)
+{
+    (void)state;
+    struct outline {
+        double corner[3][2];
+        int count;
+    } t = {.count = -1};
+    static const struct cfg_row rows[] = {{"corners", CFG_PAIRS, .size = 3,
+                                           .count_offset = offsetof(struct outline, count),
+                                           .unit = "deg", .min = -90, .max = 90},
+                                          {0}};
+    static const struct {
+        const char *text, *says;
+    } cases[] = {
+        {"corners = ( (1, -2.5), [3, 4] );", ""},
+        {"corners = ( (1, 2), (3, 4, 5), 6,\n (7, 95) );",
+         "c.cfg:1: corners = ( ... ): 4 pairs; at most 3 are allowed\n"},
+        {"corners = ( (3, 4, 5), 6,\n (\"7\", 95) );",
+         "c.cfg:1: corners[0] = ( ... ): not a pair of numbers; write (a, b)\n"
+         "c.cfg:1: corners[1] = 6: not a pair of numbers; write (a, b)\n"
+         "c.cfg:2: corners[2][0] = \"7\": not a number\n"
+         "c.cfg:2: corners[2][1] = 95: out of range; allowed -90..90 deg\n"},
+        {"corners = ( );", "c.cfg:1: corners = ( ... ): an empty list; give at least one pair\n"},
+        {"corners = [1, 2];",
+         "c.cfg:1: corners = [ ... ]: not a list of pairs; write ( (a, b), (a, b) )\n"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct heard h = {0};
+        struct cfg_file *f = cfg_parse(cases[i].text, "c.cfg", (struct cfg_sink){hear, &h});
+        const int mistakes = cfg_take(f, rows, &t);
+        cfg_close(f);
+        assert_string_equal(h.text, cases[i].says);
+        assert_int_equal(mistakes, h.lines);
+        assert_int_equal(t.count, 2); // of the first, that no other changed
+        assert_true(t.corner[0][0] == 1 && t.corner[0][1] == -2.5 && t.corner[1][1] == 4);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -414,6 +482,7 @@ int main(void)
         cmocka_unit_test(wrong_types_are_named),
         cmocka_unit_test(numbers_that_libconfig_bends_are_refused),
         cmocka_unit_test(lists_have_lengths),
+        cmocka_unit_test(lists_of_words_are_checked_word_by_word),
         cmocka_unit_test(strings_are_utf8_and_never_cut),
         cmocka_unit_test(what_is_not_a_configuration_is_refused),
         cmocka_unit_test(only_regular_files_are_opened),
@@ -423,6 +492,7 @@ int main(void)
         cmocka_unit_test(whole_numbers_are_written_out),
         cmocka_unit_test(bytes_hexadecimal_numbers_and_lists_of_texts_are_taken),
         cmocka_unit_test(their_mistakes_are_said),
+        cmocka_unit_test(pairs_are_lists_of_two),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

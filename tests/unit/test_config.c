@@ -45,8 +45,8 @@ static void a_minimal_campaign_is_two_lines(void **state)
     assert_true(c.dense_half_width_deg == 5 && c.dense_step_deg == 0.5 && c.dense_weight == 3);
     assert_true(c.readings == 4 && c.beam_readings == 16 && c.dark_readings == 16 &&
                 c.blind_half_deg == 0);
-    assert_int_equal(c.pol_in, POL_IN_LASER);
-    assert_int_equal(c.pol_out, POL_U);
+    assert_true(c.pol_in_count == 1 && c.pol_in[0] == POL_IN_LASER);
+    assert_true(c.pol_out_count == 1 && c.pol_out[0] == POL_U);
     assert_int_equal(c.fit.method, FIT_MEMETIC);
     assert_int_equal(c.fit.weighting, FIT_VARIANCE);
     assert_int_equal(c.fit.diffuse, BRDF_DIFFUSE_PAPER);
@@ -138,9 +138,8 @@ static void a_benchs_mistakes_name_their_lines(void **state)
 {
     (void)state;
     bench_complains("\"theta_i\"", "\"theta_o\"",
-                    "b.cfg:5: axes[0].name = \"theta_o\": unknown; allowed theta_i, theta_r, "
-                    "sample; did you mean "
-                    "'theta_i'?\nb.cfg:4: axes = ( ... ): axis 'theta_i' is missing\n");
+                    "b.cfg:4: axes = ( ... ): axis 'theta_i' is missing, and no kinematics says "
+                    "what makes it\n");
     bench_complains("unit = 2", "unit = 1",
                     "b.cfg:7: axes[1].unit = 1: is the unit of axes[0] on that bus too\n");
     bench_complains("bus = \"axes\"; unit = 2", "bus = \"axis\"; unit = 2",
@@ -157,7 +156,9 @@ static void a_benchs_mistakes_name_their_lines(void **state)
                     "looks into the beam\n");
     bench_complains(
         "serial:/dev/ttyUSB1", "/dev/ttyUSB1",
-        "b.cfg:9: laser.link = \"/dev/ttyUSB1\": allowed serial:PORT or tcp:HOST:PORT\n");
+        "b.cfg:9: laser.link = \"/dev/ttyUSB1\": allowed serial:PORT, tcp:HOST:PORT or "
+        "usbtmc:VID:PID:SERIAL\n");
+    bench_complains("serial:/dev/ttyUSB1", "usbtmc:1313:8072:P0001234", "");
     bench_complains("modbus-rtu:", "rtu:",
                     "b.cfg:3: buses[0].link = \"rtu:/dev/ttyUSB0?baud=115200&parity=E\": allowed "
                     "modbus-rtu:PORT or "
@@ -177,6 +178,161 @@ static void the_lasers_polarisation_must_be_said(void **state)
     bench_complains("polarisation = \"u\"", "polarisation = \"unknown\"", "");
 }
 
+static void a_campaign_may_have_several_states(void **state)
+{
+    (void)state;
+    struct campaign_channel channels[CAMPAIGN_CHANNELS];
+#define STATES(more) "campaign: { name = \"a\"; theta_i_deg = 1;\n " more " };"
+    struct campaign_config c =
+        fixture_campaign(STATES("pol_in = (\"s\", \"p\"); pol_out = [\"u\", \"+45\"];"));
+    assert_int_equal(campaign_channels(&c, channels), 4); // all of one pol_in before the next
+    const int each[][2] = {
+        {POL_S, POL_U}, {POL_S, POL_PLUS45}, {POL_P, POL_U}, {POL_P, POL_PLUS45}};
+    for (int i = 0; i < 4; i++)
+        assert_true(channels[i].in == each[i][0] && channels[i].out == each[i][1]);
+    c = fixture_campaign(STATES("pol_in = (\"s\", \"p\", \"s\"); pol_out = (\"s\", \"p\", \"p\"); "
+                                "pol_combine = \"pairs\";"));
+    assert_int_equal(campaign_channels(&c, channels), 3);
+    assert_true(channels[1].in == POL_P && channels[1].out == POL_P);
+    assert_true(channels[2].in == POL_S && channels[2].out == POL_P);
+    c = fixture_campaign(STATES(""));
+    assert_int_equal(campaign_channels(&c, channels), 1);
+    assert_true(channels[0].in == POL_IN_LASER && channels[0].out == POL_U);
+    campaign_complains(
+        STATES("pol_in = (\"s\", \"p\",\n \"s\", \"vertical\");"),
+        "bad.cfg:3: campaign.pol_in[3] = \"vertical\": unknown; allowed \"u\", \"s\", \"p\", "
+        "\"+45\", \"-45\", \"R\", \"L\", \"laser\"\n");
+    campaign_complains(
+        STATES("pol_in = (\"s\", \"p\",\n \"s\");\n pol_out = (\"u\", \"u\");"),
+        "bad.cfg:3: campaign.pol_in[2] = \"s\": is there already; each state once\n"
+        "bad.cfg:4: campaign.pol_out[1] = \"u\": is there already; each state once\n");
+    campaign_complains(STATES("pol_in = (\"s\", \"p\");\n pol_combine = \"pairs\";"),
+                       "bad.cfg:3: campaign.pol_combine = \"pairs\": pol_in has 2 and pol_out 1; "
+                       "for pairs as many of each\n");
+    campaign_complains(STATES("pol_in = (\"s\", \"s\"); pol_out = (\"p\", \"p\");\n"
+                              " pol_combine = \"pairs\";"),
+                       "bad.cfg:2: campaign.pol_in[1] = \"s\": with its pol_out is there already; "
+                       "each pair once\n");
+#undef STATES
+}
+
+static void a_benchs_states_are_read(void **state)
+{
+    (void)state;
+    const struct bench_config b = fixture_polarised_bench();
+    const struct bench_state *p = bench_find_state(&b.polarisation.pol_in, POL_P);
+    assert_true(p && p->axes_count == 1 && p->axes[0].at == 90);
+    assert_string_equal(p->axes[0].name, "polariser");
+    assert_true(bench_find_state(&b.polarisation.pol_out, POL_U)->axes[0].at == 270);
+    assert_null(bench_find_state(&b.polarisation.pol_in, POL_U));
+    assert_true(b.polarisation.polariser_extinction == 0.002 && b.polarisation.extinction == 0.001);
+    assert_true(b.polarisation.transmission == 0.8 && b.polarisation.u_transmission == 0.008);
+    const struct bench_config plain = fixture_bench();
+    assert_true(plain.polarisation.pol_in.count == 0 && plain.polarisation.transmission == 1);
+}
+
+static void states_complain(const char *old, const char *new, const char *expected)
+{
+    char text[4000], changed[4000];
+    fixture_polarised_text(text, sizeof text);
+    const char *at = strstr(text, old);
+    assert_non_null(at);
+    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, new, at + strlen(old));
+    struct bench_config b;
+    struct said said = {0};
+    int rc = bench_config_parse(changed, "b.cfg", (struct cfg_sink){fixture_say, &said}, &b);
+    assert_string_equal(said.text, expected);
+    assert_int_equal(rc, *expected ? GON_E_INPUT : GON_OK);
+}
+
+static void mistakes_in_states_name_their_lines(void **state)
+{
+    (void)state;
+    states_complain(
+        "{ is = \"p\"; axes = ( { name = \"polariser\"",
+        "{ is = \"p\"; axes = ( { name = \"polarizer\"",
+        "b.cfg:20: polarisation.pol_in[1].axes[0].name = \"polarizer\": no axis of that "
+        "name in axes; did you mean 'polariser'?\n"
+        "b.cfg:20: polarisation.pol_in[1].axes = ( ... ): does not say where axis "
+        "polariser stands, as state \"s\" of this side does\n"
+        "b.cfg:20: polarisation.pol_in[1].axes = ( ... ): places axis polarizer, and "
+        "state \"s\" of this side does not say where that stands\n");
+    states_complain("at = 270.0", "at = 300.0",
+                    "b.cfg:21: polarisation.pol_out[0].axes[0].at = 300: beyond the limits of axis "
+                    "analyser; allowed -10..280 deg\n");
+    states_complain("{ is = \"p\"; axes = ( { name = \"analyser\"",
+                    "{ is = \"s\"; axes = ( { name = \"analyser\"",
+                    "b.cfg:23: polarisation.pol_out[2].is = \"s\": is there already, in "
+                    "pol_out[1]\n");
+    states_complain(
+        "is = \"s\"", "is = \"vertical\"",
+        "b.cfg:19: polarisation.pol_in[0].is = \"vertical\": unknown; allowed \"u\", \"s\", "
+        "\"p\", \"+45\", \"-45\", \"R\", \"L\"\n");
+    states_complain(
+        "( { name = \"polariser\"; at = 90.0; } )",
+        "( { name = \"polariser\"; at = 90.0; }, { name = \"polariser\"; at = 9.0; } )",
+        "b.cfg:20: polarisation.pol_in[1].axes[1].name = \"polariser\": is placed twice "
+        "in one state\n");
+    states_complain("( { name = \"polariser\"; at = 90.0; } )", "( )",
+                    "b.cfg:20: polarisation.pol_in[1].axes = ( ... ): an empty list; give at least "
+                    "one group\n");
+    states_complain("{ is = \"u\"; axes = ( { name = \"analyser\"; at = 270.0; } ); }",
+                    "{ is = \"u\"; axes = ( { name = \"theta_r\"; at = 90.0; } ); }",
+                    "b.cfg:21: polarisation.pol_out[0].axes[0].name = \"theta_r\": moves with the "
+                    "directions; name an element's axis\n"
+                    "b.cfg:22: polarisation.pol_out[1].axes = ( ... ): does not say where axis "
+                    "theta_r stands, as state \"u\" of this side does\n"
+                    "b.cfg:22: polarisation.pol_out[1].axes = ( ... ): places axis analyser, and "
+                    "state \"u\" of this side does not say where that stands\n"
+                    "b.cfg:23: polarisation.pol_out[2].axes = ( ... ): does not say where axis "
+                    "theta_r stands, as state \"u\" of this side does\n"
+                    "b.cfg:23: polarisation.pol_out[2].axes = ( ... ): places axis analyser, and "
+                    "state \"u\" of this side does not say where that stands\n");
+    states_complain("sample_mm = 30.0; }",
+                    "sample_mm = 30.0; axes = ( { name = \"analyser\"; at = 0.0; } ); }",
+                    "b.cfg:17: stations[0].axes[0].name = \"analyser\": stands as the states of "
+                    "polarisation say, not where a station does\n");
+    states_complain("transmission = 0.8", "transmission = 1.8",
+                    "b.cfg:25: polarisation.analyser.transmission = 1.8: out of range; allowed "
+                    "0.01..1\n");
+}
+
+static void an_axis_belongs_to_one_side(void **state)
+{
+    (void)state;
+    char text[4000];
+    struct bench_config b;
+    struct said said = {0};
+    fixture_polarised_text(text, sizeof text);
+    for (char *at = text; (at = strstr(at, "{ name = \"polariser\"; at"));)
+        memcpy(at, "{ name = \"analyser\" ; at", 24); // as long
+    assert_int_equal(bench_config_parse(text, "b.cfg", (struct cfg_sink){fixture_say, &said}, &b),
+                     GON_E_INPUT);
+    assert_string_equal(said.text,
+                        "b.cfg:21: polarisation.pol_out = ( ... ): axis analyser belongs "
+                        "to pol_in already\n");
+}
+
+static void a_campaign_goes_on_with_the_same_states_only(void **state)
+{
+    (void)state;
+    const struct bench_config then = fixture_polarised_bench();
+    struct bench_config now = then;
+    struct gon_error err;
+    now.polarisation.u_transmission = 0.5; // a better calibration
+    assert_int_equal(bench_same_states(&then.polarisation, &now.polarisation, &err), 0);
+    now.polarisation.pol_out.state[2].axes[0].at = 91;
+    assert_int_equal(bench_same_states(&then.polarisation, &now.polarisation, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "pol_out \"p\" elsewhere"));
+    now = then;
+    now.polarisation.pol_in.count = 1;
+    assert_int_equal(bench_same_states(&then.polarisation, &now.polarisation, &err), GON_E_REFUSED);
+    now = then;
+    now.polarisation.transmission = 0.9;
+    assert_int_equal(bench_same_states(&then.polarisation, &now.polarisation, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "passes 0.8"));
+}
+
 static void polarisations_have_names(void **state)
 {
     (void)state;
@@ -184,6 +340,12 @@ static void polarisations_have_names(void **state)
     assert_int_equal(polarisation_find("x"), -1);
     assert_string_equal(polarisation_name(POL_PLUS45), "+45");
     assert_string_equal(polarisation_name(POL_UNKNOWN), "unknown");
+    for (int i = 0; i < POL_COUNT; i++)
+        assert_int_equal(polarisation_crossed(polarisation_crossed((enum polarisation)i)), i);
+    assert_true(polarisation_passed(POL_S, POL_S) == 1 && polarisation_passed(POL_S, POL_P) == 0);
+    assert_true(polarisation_passed(POL_U, POL_P) == 0.5 &&
+                polarisation_passed(POL_R, POL_S) == 0.5);
+    assert_true(polarisation_passed(POL_L, POL_U) == 1 && polarisation_passed(POL_L, POL_R) == 0);
 }
 
 static void a_bench_remembers_its_folder_and_profiles(void **state)
@@ -209,6 +371,11 @@ int main(void)
         cmocka_unit_test(a_bench_is_read_whole),
         cmocka_unit_test(a_benchs_mistakes_name_their_lines),
         cmocka_unit_test(the_lasers_polarisation_must_be_said),
+        cmocka_unit_test(a_campaign_may_have_several_states),
+        cmocka_unit_test(a_benchs_states_are_read),
+        cmocka_unit_test(mistakes_in_states_name_their_lines),
+        cmocka_unit_test(an_axis_belongs_to_one_side),
+        cmocka_unit_test(a_campaign_goes_on_with_the_same_states_only),
         cmocka_unit_test(polarisations_have_names),
         cmocka_unit_test(a_bench_remembers_its_folder_and_profiles),
     };

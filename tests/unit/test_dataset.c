@@ -146,7 +146,8 @@ static void columns_that_look_misspelt_are_noted(void **state)
     says("theta_i_deg,theta_r_signed_deg,f_r,u_f_r,pol_in,pol_out\n10,2,3,1,s,u\n", NULL, "");
     says("theta_i_deg,theta_r_signed_deg,f_450nm,f_550nm,u_f_450nm\n10,2,3,4,1\n", "f_550nm", "");
     says("id,theta_i_deg,theta_r_signed_deg,f_r,point,note,n,unit,sweep,plane,u_theta_i_deg,time\n"
-         "1,10,2,3,1,2,3,4,5,6,7,8\n", NULL, "");
+         "1,10,2,3,1,2,3,4,5,6,7,8\n",
+         NULL, "");
 }
 
 static void angles_that_may_be_radians_are_noted(void **state)
@@ -402,16 +403,18 @@ static void measured_paints_are_read(void **state)
     "60; step_deg = 30; };"                                                                        \
     " dense: { half_width_deg = 0; }; %s };"
 
-static struct store *measured(const struct fixture_folder *folder, const char *more)
+static struct store *measured_with(const struct fixture_folder *folder, const char *more,
+                                   const char *bench_text)
 {
     char text[600], file[128];
     snprintf(text, sizeof text, CAMPAIGN, more);
     const struct campaign_config config = fixture_campaign(text);
-    const struct bench_config bench = fixture_bench();
+    struct bench_config bench;
+    assert_int_equal(bench_config_parse(bench_text, "bench.cfg", (struct cfg_sink){0}, &bench), 0);
     struct plan plan;
     struct store *s;
     assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
-    const struct store_new what = {&config, text, "c.cfg", &bench, FIXTURE_BENCH, &plan, 1};
+    const struct store_new what = {&config, text, "c.cfg", &bench, bench_text, &plan, 1};
     assert_int_equal(
         store_create(fixture_path(folder, "0001-a.gonio", file, sizeof file), &what, &s, NULL), 0);
     for (int i = 0; i < plan.count; i++) {
@@ -434,6 +437,11 @@ static struct store *measured(const struct fixture_folder *folder, const char *m
     }
     plan_clear(&plan);
     return s;
+}
+
+static struct store *measured(const struct fixture_folder *folder, const char *more)
+{
+    return measured_with(folder, more, FIXTURE_BENCH);
 }
 
 static void a_campaign_becomes_a_data_set(void **state)
@@ -480,6 +488,34 @@ static void a_campaign_tells_its_channel(void **state)
     fixture_remove(&folder);
 }
 
+static void every_row_has_its_own_states(void **state)
+{
+    (void)state;
+    const struct fixture_folder folder = fixture_folder();
+    struct dataset_filter f = dataset_filter_all();
+    char text[4000];
+    struct store *s = measured_with(&folder, "pol_in = (\"s\", \"p\"); pol_out = (\"u\", \"p\");",
+                                    fixture_polarised_text(text, sizeof text));
+    struct dataset d;
+    const int states[4][2] = {{BRDF_STATE_S, BRDF_STATE_U},
+                              {BRDF_STATE_S, BRDF_STATE_P},
+                              {BRDF_STATE_P, BRDF_STATE_U},
+                              {BRDF_STATE_P, BRDF_STATE_P}};
+    assert_int_equal(dataset_from_store(s, &f, &d, NULL, NULL), 0);
+    assert_true(d.count == 60 && d.pol_in && d.pol_out);
+    for (size_t i = 0; i < d.count; i++)
+        assert_true(d.pol_in[i] == states[i / 5 % 4][0] && d.pol_out[i] == states[i / 5 % 4][1]);
+    dataset_clear(&d);
+    f.theta_i_deg[f.theta_i_count++] = 30;
+    assert_int_equal(dataset_from_store(s, &f, &d, NULL, NULL), 0);
+    assert_true(d.count == 20 && d.left_out == 40);
+    assert_true(fabs(d.f_per_sr[0] * UNITS_PI * 0.016 * 0.016 - 1e-4) < 1e-9);
+    assert_true(fabs(d.f_per_sr[5] / d.f_per_sr[0] * 0.8 - 1) < 1e-9); // over T
+    dataset_clear(&d);
+    store_close(s, NULL);
+    fixture_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -498,6 +534,7 @@ int main(void)
         cmocka_unit_test(measured_paints_are_read),
         cmocka_unit_test(a_campaign_becomes_a_data_set),
         cmocka_unit_test(a_campaign_tells_its_channel),
+        cmocka_unit_test(every_row_has_its_own_states),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }

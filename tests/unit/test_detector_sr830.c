@@ -4,6 +4,7 @@
 #include "drivers/detector.h"
 
 #include "drivers/by_profile.h"
+#include "drivers/link_stats.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
 #include "tests/unit/profiles.h"
@@ -160,6 +161,7 @@ static void a_setting_that_does_not_take_is_an_error(void **state)
     s.step = 1; // reads back as told, but complains
     assert_int_equal(d->ops->set_range(d, 26, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "refuses 'SENS 26;SENS?' (esr is 16 (bad parameter))"));
+    assert_int_equal(d->ops->stats(d)->errors[LINK_REFUSED], 2);
     d->ops->free(d);
 }
 

@@ -667,6 +667,57 @@ static void an_off_that_is_not_confirmed_is_repeated_until_it_is(void **state)
     end(r);
 }
 
+// --- kinematics --------------------------------------------------------------------------------
+
+// The same motors behind other numbers: theta_i counts backwards from 7, theta_r is geared 2 to 1
+// and sits 12.5 off.
+static void gear(struct run *r)
+{
+    struct bench_axis *i = &r->bench.axes[0], *a = &r->bench.axes[1];
+    snprintf(i->name, sizeof i->name, "tilt");
+    snprintf(a->name, sizeof a->name, "gear");
+    i->steps_per_unit = -1000;
+    i->zero = 7;
+    i->min = -81;
+    i->max = 12;
+    i->approach = BENCH_FROM_ABOVE; // which is from below for the motor
+    a->steps_per_unit = 500;
+    a->zero = -12.5;
+    a->min = -372.5;
+    a->max = 347.5;
+    a->speed *= 2;
+    a->acceleration *= 2;
+    a->backlash *= 2;
+    a->deadband *= 2;
+    r->bench.kinematics.rows_count = 2;
+    r->bench.kinematics.rows[0] = (struct bench_row){.axis = "tilt", .theta_i = -1, .offset = 7};
+    r->bench.kinematics.rows[1] = (struct bench_row){.axis = "gear", .theta_r = 2, .offset = -12.5};
+    struct instrument_parts parts = simbench_parts(&r->b);
+    instrument_free(r->in);
+    assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
+}
+
+static void another_bench_of_the_same_motors_measures_the_same(void **state)
+{
+    (void)state;
+    struct run *direct = begin(NULL), *geared = begin(NULL);
+    gear(geared);
+    assert_int_equal(go(direct), RUN_DONE);
+    assert_int_equal(go(geared), RUN_DONE);
+    assert_int_equal(geared->rows, direct->rows);
+    for (int i = 0; i < direct->rows; i++) {
+        const struct store_reading *a = &direct->row[i], *b = &geared->row[i];
+        assert_int_equal(a->theta_i_udeg, b->theta_i_udeg);
+        assert_int_equal(a->theta_r_udeg, b->theta_r_udeg);
+        assert_true(a->signal_v == b->signal_v && a->monitor_v == b->monitor_v);
+    }
+    double worst, rms;
+    compare(geared, &worst, &rms);
+    assert_true(worst < 4.5);
+    end(direct);
+    end(geared);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -694,6 +745,7 @@ int main(void)
         cmocka_unit_test(nonsense_is_asked_again_and_in_the_end_somebody_is),
         cmocka_unit_test(a_restarted_controller_is_homed_again_in_the_dark),
         cmocka_unit_test(an_off_that_is_not_confirmed_is_repeated_until_it_is),
+        cmocka_unit_test(another_bench_of_the_same_motors_measures_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,12 +46,14 @@ static struct http_reply request(void *ctx, const struct http_request *r, uint64
     if (!strcmp(r->path, "/later")) {
         w->later = ticket;
         loop_quit(w->loop);
-        return (struct http_reply){HTTP_LATER, NULL, NULL};
+        return (struct http_reply){.status = HTTP_LATER};
     }
     if (!strcmp(r->path, "/events"))
-        return (struct http_reply){HTTP_STREAM, NULL, NULL};
+        return (struct http_reply){.status = HTTP_STREAM};
     assert_int_equal(r->pid, getpid());
-    return (struct http_reply){200, strdup("{\"ok\":true}"), NULL};
+    if (!strcmp(r->path, "/text"))
+        return (struct http_reply){.status = 200, .body = strdup("{}"), .type = "text/plain"};
+    return (struct http_reply){.status = 200, .body = strdup("{\"ok\":true}")};
 }
 
 static void give_up(void *ctx)
@@ -151,6 +153,24 @@ static void a_body_arrives_whole(void **state)
            "chunked\r\n\r\n2\r\nab\r\n1\r\nc\r\n0\r\n\r\n",
            "200");
     assert_string_equal(w->body, "abc");
+}
+
+static void a_reply_is_json_unless_it_says_otherwise(void **state)
+{
+    static const char *const cases[][2] = {
+        {"/x", "\r\nContent-Type: application/json\r\n"},
+        {"/text", "\r\nContent-Type: text/plain\r\n"},
+    };
+    struct world *w = *state;
+    for (int i = 0; i < 2; i++) {
+        struct client c;
+        char ask[60];
+        client_open(&c, w);
+        snprintf(ask, sizeof ask, "GET %s HTTP/1.1\r\nHost: a\r\n\r\n", cases[i][0]);
+        talk(&c, ask, "}");
+        assert_non_null(strstr(c.text, cases[i][1]));
+        client_close(&c);
+    }
 }
 
 static void ambiguous_lengths_are_refused(void **state)
@@ -315,6 +335,7 @@ int main(void)
 #define TEST(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         TEST(a_body_arrives_whole),
+        TEST(a_reply_is_json_unless_it_says_otherwise),
         TEST(ambiguous_lengths_are_refused),
         TEST(large_bodies_are_refused),
         TEST(large_headers_are_refused),

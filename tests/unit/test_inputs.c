@@ -6,6 +6,7 @@
 
 #include "drivers/blocks.h"
 #include "drivers/bus.h"
+#include "drivers/link_stats.h"
 #include "sim/actor_registers.h"
 #include "tests/unit/noisy.h"
 #include "tests/unit/vline.h"

@@ -4,6 +4,7 @@
 #include "drivers/laser.h"
 
 #include "drivers/by_profile.h"
+#include "drivers/link_stats.h"
 #include "sim/bench.h"
 #include "tests/unit/noisy.h"
 #include "tests/unit/profiles.h"
@@ -122,6 +123,7 @@ static void power_is_set_and_read_back(void **state)
     assert_true(fabs(lamp->setpoint_w - 0.0375) < 1e-9);
     assert_true(fabs(look(l).setpoint_w - 0.0375) < 1e-9);
     assert_int_equal(l->ops->set_power(l, 90, &err), GON_E_DEVICE); // it says Error
+    assert_int_equal(l->ops->stats(l)->errors[LINK_REFUSED], 1);
     assert_int_equal(l->ops->set_power(l, -1, &err), GON_E_INPUT);
     assert_int_equal(l->ops->set_power(l, 101, &err), GON_E_INPUT);
     assert_int_equal(l->ops->set_power(l, (double)NAN, &err), GON_E_INPUT);

@@ -70,8 +70,8 @@ static void answers_come_without_terminator_and_blanks(void **state)
     struct message *m = begin(&s, hear_well, NULL);
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), 0);
     assert_string_equal(answer, "1");
-    assert_int_equal(message_stats(m)->queries, 1);
-    assert_int_equal(message_stats(m)->last_latency_ns, MS(20));
+    assert_int_equal(message_stats(m)->requests, 1);
+    assert_int_equal(message_stats(m)->latency_last_ns, MS(20));
     message_free(m);
 }
 
@@ -154,7 +154,10 @@ static void a_late_answer_is_not_taken_for_the_next_ones(void **state)
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), 0);
     assert_string_equal(answer, "2");
     assert_int_equal(s.heard, 3); // with the question that gets into step
-    assert_int_equal(message_stats(m)->timeouts, 1);
+    assert_int_equal(message_stats(m)->errors[LINK_SILENT], 1);
+    assert_int_equal(message_stats(m)->resyncs, 1);
+    assert_int_equal(message_stats(m)->requests, 3);
+    assert_int_equal(link_stats_answers(message_stats(m)), 2);
     message_free(m);
 }
 
@@ -185,6 +188,7 @@ static void a_doubled_answer_is_dropped(void **state)
     assert_string_equal(answer, "3");
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), 0);
     assert_string_equal(answer, "4");
+    assert_int_equal(message_stats(m)->errors[LINK_STRAY], 1);
     message_free(m);
 }
 
@@ -207,6 +211,7 @@ static void unreadable_bytes_are_no_answer(void **state)
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), GON_E_LINK);
     assert_string_equal(answer, "kept");
     assert_non_null(strstr(err.text, "\\xff\\x80"));
+    assert_int_equal(message_stats(m)->errors[LINK_GARBLED], 1);
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), 0);
     assert_string_equal(answer, "2");
     message_free(m);
@@ -256,6 +261,8 @@ static void an_echo_is_named(void **state)
     struct message *m = begin(&s, hear_and_echo, NULL);
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "turn its echo off"));
+    assert_int_equal(message_stats(m)->errors[LINK_ECHO], 1);
+    assert_int_equal(link_stats_failures(message_stats(m)), 1);
     message_free(m);
 }
 
@@ -279,7 +286,8 @@ static void a_hang_up_is_no_timeout(void **state)
     assert_int_equal(vline.clk.t_ns - start_ns, MS(30));
     assert_int_equal(message_query(m, "v?", answer, sizeof answer, &err), GON_E_GONE);
     assert_true(vline.waits < 10); // no spinning
-    assert_int_equal(message_stats(m)->timeouts, 0);
+    assert_int_equal(message_stats(m)->errors[LINK_SILENT], 0);
+    assert_int_equal(message_stats(m)->errors[LINK_HUNG_UP], 1);
     message_free(m);
 }
 
@@ -379,12 +387,14 @@ static void asking_again_is_bounded(void **state)
     struct message *m = begin(&s, hear_late, NULL);
     assert_int_equal(message_ask_number(m, "v?", &value, &err), 0);
     assert_true(value == 2);
+    assert_int_equal(message_stats(m)->retries, 1);
     message_free(m);
 
     m = begin(&s, hear_nothing, NULL);
     value = -1;
     assert_int_equal(message_ask_number(m, "v?", &value, &err), GON_E_LINK);
     assert_int_equal(s.heard, 3); // the query, and two that tried to get into step
+    assert_int_equal(message_stats(m)->retries, 2);
     assert_true(value == -1);
     message_free(m);
 }

@@ -140,7 +140,8 @@ static void references_are_averaged_and_their_scatter_counts(void **state)
     assert_true(near(r.points[0].f_per_sr, 0.01 / 2.01 / (r.omega_sr * 0.5), 1e-9));
     assert_true(near(r.u_scale_rel, sqrt(2e-6 + 0.01 / 2.01 * 0.01 / 2.01), 1e-6));
     const struct reduce_reference o = reduce_opening(&s.plan, s.rows, s.count);
-    assert_true(o.beam_signal_v == 2.0001 && o.dark_signal_v == 0 && o.beam_monitor_v == 1);
+    assert_true(o.beam_signal_v[POL_U] == 2.0001 && o.dark_signal_v == 0 &&
+                o.beam_monitor_v[POL_U] == 1);
     reduction_clear(&r);
     plan_clear(&s.plan);
 }
@@ -155,7 +156,7 @@ static void only_accepted_readings_are_reduced(void **state)
     add(&s, 0, 0, 0, 0);
     assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "no beam reading yet"));
-    assert_true(isnan(reduce_opening(&s.plan, s.rows, s.count).beam_signal_v));
+    assert_true(isnan(reduce_opening(&s.plan, s.rows, s.count).beam_signal_v[POL_U]));
     add(&s, 0, 1, 1, 1);
     add(&s, 1, 0, 9, 1)->flags = STORE_SATURATED;
     add(&s, 1, 0, 0.5, 1)->attempt = 2;
@@ -173,6 +174,127 @@ static void only_accepted_readings_are_reduced(void **state)
     s.rows[1].signal_v = -1;
     assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "not above the dark"));
+    plan_clear(&s.plan);
+}
+
+#define POLARISED(states)                                                                          \
+    "campaign: { name = \"a\"; theta_i_deg = 30; theta_r: { from_deg = 0; to_deg = 60; step_deg "  \
+    "= "                                                                                           \
+    "60; };"                                                                                       \
+    " dense: { half_width_deg = 0; }; " states " };"
+
+static void start_polarised(struct setup *s, const char *campaign)
+{
+    const struct campaign_config c = fixture_campaign(campaign);
+    memset(s, 0, sizeof *s);
+    s->bench = fixture_polarised_bench();
+    assert_int_equal(plan_make(&c, &s->bench, &s->plan, NULL), 0);
+}
+
+// Beam of s 2, of p 0.5: each reading goes over its own. Extinction 0.002 of the polariser, over
+// sqrt(3), times the other state's f in the same direction; radius and distance sqrt(2e-6).
+static void each_state_is_divided_by_its_own_beam(void **state)
+{
+    (void)state;
+    static struct setup s;
+    struct reduction r;
+    start_polarised(&s, POLARISED("pol_in = (\"s\", \"p\");"));
+    add(&s, 0, 0, 0, 0);
+    add(&s, 0, 1, 2.0, 1);
+    add(&s, 0, 2, 0.5, 1);
+    add(&s, 1, 0, 0.004, 1);
+    add(&s, 1, 1, 0.002, 1);
+    add(&s, 1, 2, 0.003, 1);
+    add(&s, 1, 3, 0.001, 1);
+    add(&s, 2, 0, 2.0, 1);
+    add(&s, 2, 1, 0.5, 1);
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    const double omega_sr = r.omega_sr, u_scale = sqrt(2e-6), u_leak = 0.002 / sqrt(3);
+    assert_true(r.count == 4 && r.channels == 2 && r.beams == 4 && r.darks == 1);
+    const double f_per_sr[] = {0.002, 0.002, 0.006, 0.004}; // times Omega; 60 deg halves the cosine
+    for (int i = 0; i < 4; i++) {
+        assert_true(near(r.points[i].f_per_sr, f_per_sr[i] / omega_sr, 1e-9));
+        assert_true(r.points[i].pol_in == (i < 2 ? POL_S : POL_P) && r.points[i].pol_out == POL_U);
+        assert_true(near(r.points[i].u_b_per_sr,
+                         hypot(f_per_sr[i] * u_scale, f_per_sr[(i + 2) % 4] * u_leak) / omega_sr,
+                         1e-9));
+    }
+    assert_true(near(r.u_scale_rel, u_scale, 1e-9) && r.channel[1].u_analyser_rel == 0);
+    assert_true(r.reference.beam_signal_v[POL_S] == 2 && r.reference.beam_signal_v[POL_P] == 0.5);
+    assert_true(isnan(r.reference.beam_signal_v[POL_U]));
+    reduction_clear(&r);
+    plan_clear(&s.plan);
+}
+
+// T = 0.8 with u 1 %: a reading behind the analyser goes over T, and u(T)/T is in its scale. It was
+// s through s: of the crossed one there is no reading, so the leaks count as part of f itself.
+static void readings_behind_the_analyser_go_over_its_transmission(void **state)
+{
+    (void)state;
+    static struct setup s;
+    struct reduction r;
+    start_polarised(&s, POLARISED("pol_in = \"s\"; pol_out = (\"s\", \"u\");"));
+    add(&s, 0, 0, 0, 0);
+    add(&s, 0, 1, 2.0, 1);
+    add(&s, 1, 0, 0.004, 1);
+    add(&s, 1, 2, 0.004, 1);
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(near(r.points[0].f_per_sr, 0.002 / 0.8 / r.omega_sr, 1e-9));
+    assert_true(near(r.points[1].f_per_sr, 0.002 / r.omega_sr, 1e-9));
+    assert_true(near(r.channel[0].u_scale_rel, sqrt(2e-6 + 1e-4), 1e-9));
+    assert_true(near(r.channel[1].u_scale_rel, sqrt(2e-6), 1e-9));
+    assert_true(near(r.u_scale_rel, sqrt(2e-6 + 1e-4), 1e-9)); // the largest
+    assert_true(near(r.points[0].u_b_per_sr / r.points[0].f_per_sr,
+                     sqrt(2e-6 + 1e-4 + (0.002 * 0.002 + 0.001 * 0.001) / 3), 1e-9));
+    reduction_clear(&r);
+    plan_clear(&s.plan);
+    // An analyser that stays in the beam: T cancels, with its uncertainty; of u light half passes.
+    start_polarised(&s, POLARISED("pol_in = \"s\"; pol_out = \"s\";"));
+    s.plan.points[1].pol_out = POL_S;
+    add(&s, 0, 0, 0, 0);
+    add(&s, 0, 1, 2.0, 1);
+    add(&s, 1, 0, 0.004, 1);
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(near(r.points[0].f_per_sr, 0.002 / r.omega_sr, 1e-9));
+    assert_true(near(r.u_scale_rel, sqrt(2e-6), 1e-9));
+    reduction_clear(&r);
+    for (int i = 0; i < s.plan.count; i++)
+        s.plan.points[i].pol_in = POL_U;
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(near(r.points[0].f_per_sr, 0.001 / r.omega_sr, 1e-9));
+    reduction_clear(&r);
+    plan_clear(&s.plan);
+}
+
+// Without states in the bench's file the operator's analyser stood in the beam too: as ever.
+static void an_operators_analyser_is_not_reckoned_with(void **state)
+{
+    (void)state;
+    static struct setup s;
+    struct reduction r;
+    start(&s, POLARISED("pol_out = \"s\";"));
+    add(&s, 0, 0, 0, 0);
+    add(&s, 0, 1, 2.0, 1);
+    add(&s, 1, 0, 0.004, 1);
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(near(r.points[0].f_per_sr, 0.002 / r.omega_sr, 1e-9));
+    assert_true(r.points[0].pol_in == POL_U && r.points[0].pol_out == POL_S);
+    reduction_clear(&r);
+    plan_clear(&s.plan);
+}
+
+static void a_state_without_its_beam_is_refused(void **state)
+{
+    (void)state;
+    static struct setup s;
+    struct reduction r;
+    struct gon_error err;
+    start_polarised(&s, POLARISED("pol_in = (\"s\", \"p\");"));
+    add(&s, 0, 0, 0, 0);
+    add(&s, 0, 1, 2.0, 1);
+    add(&s, 1, 0, 0.004, 1);
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "no beam reading yet of pol_in = \"p\""));
     plan_clear(&s.plan);
 }
 
@@ -326,6 +448,10 @@ int main(void)
         cmocka_unit_test(angles_are_the_encoders),
         cmocka_unit_test(references_are_averaged_and_their_scatter_counts),
         cmocka_unit_test(only_accepted_readings_are_reduced),
+        cmocka_unit_test(each_state_is_divided_by_its_own_beam),
+        cmocka_unit_test(readings_behind_the_analyser_go_over_its_transmission),
+        cmocka_unit_test(an_operators_analyser_is_not_reckoned_with),
+        cmocka_unit_test(a_state_without_its_beam_is_refused),
         cmocka_unit_test(the_noise_model_finds_floor_and_relative_part),
         cmocka_unit_test(the_beam_alone_tells_the_relative_part),
         cmocka_unit_test(a_pure_floor_has_no_relative_part),

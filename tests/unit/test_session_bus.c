@@ -3,6 +3,7 @@
 // A unit made from a profile, asked and told by the same profile over the unmodified libmodbus, in
 // virtual time.
 #include "drivers/bus.h"
+#include "drivers/link_stats.h"
 #include "drivers/session.h"
 #include "sim/actor_registers.h"
 #include "tests/unit/noisy.h"

@@ -69,6 +69,7 @@ static void the_table_has_the_worlds_own_defaults(void **state)
                 a->monitor_v_per_w == b->monitor_v_per_w);
     assert_true(a->monitor_dark_v == b->monitor_dark_v && a->monitor_noise_v == b->monitor_noise_v);
     assert_true(a->seed == b->seed && a->reference_hz == b->reference_hz);
+    assert_memory_equal(&a->elements, &b->elements, sizeof b->elements);
     assert_memory_equal(a->axis, b->axis, sizeof b->axis);
     assert_memory_equal(c.bench.steps_per_unit, own.steps_per_unit, sizeof own.steps_per_unit);
     assert_true(c.bench.home_speed == own.home_speed && c.bench.start_s == own.start_s);

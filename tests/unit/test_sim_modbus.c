@@ -377,7 +377,7 @@ static void one_frame_moves_an_axis(void **state)
 {
     (void)state;
     struct axes *a = axes();
-    struct port *p = bench_port(&a->bench, BENCH_AXES);
+    struct port *p = bench_port(&a->bench, BENCH_AXES_RTU);
     uint8_t out[PORT_REPLY_MOST], f[64];
     // Unit 2 to 10000 steps, 20000 steps/s, 60000 steps/s2 both ways, full current, start.
     size_t n = bytes("02 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 27 10 00 00 4E 20 00 00 "

@@ -2,6 +2,8 @@
 // uses: campaign fit model base
 #include "campaign_fixture.h"
 
+#include "base/units.h"
+#include "campaign/reduce.h"
 #include "campaign/store_lock.h"
 #include "campaign/store_row.h"
 
@@ -176,6 +178,7 @@ static void the_campaign_is_kept_as_it_was(void **state)
         assert_true(x->theta_i_deg == y->theta_i_deg && x->theta_r_deg == y->theta_r_deg &&
                     x->weight == y->weight);
         assert_true(!x->done && x->attempts == 0);
+        assert_true(x->pol_in == POL_U && y->pol_in == POL_U && x->pol_out == y->pol_out);
         assert_string_equal(x->station, y->station);
     }
     const char *const meta[][2] = {
@@ -529,9 +532,85 @@ static void other_files_and_newer_ones_are_refused(void **state)
     assert_int_equal(store_open(folder.path, STORE_READ, &s, &err), GON_E_INPUT);
     unlink(path);
     store_close(created(), NULL);
-    tamper("PRAGMA user_version = 2");
+    tamper("PRAGMA user_version = 3");
     assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_REFUSED);
     assert_non_null(strstr(err.text, "newer"));
+}
+
+static int64_t number(const char *sql)
+{
+    sqlite3 *db;
+    sqlite3_stmt *q;
+    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+    assert_int_equal(sqlite3_prepare_v2(db, sql, -1, &q, NULL), SQLITE_OK);
+    assert_int_equal(sqlite3_step(q), SQLITE_ROW);
+    const int64_t value = sqlite3_column_int64(q, 0);
+    sqlite3_finalize(q);
+    sqlite3_close(db);
+    return value;
+}
+
+// Only a file of several states is one that an older gonio would misread.
+static void several_states_are_kept_and_make_version_2(void **state)
+{
+    (void)state;
+    static const char states[] =
+        "campaign: { name = \"a\"; theta_i_deg = (10, 20); pol_in = (\"s\", \"p\");"
+        " dense: { half_width_deg = 0; }; };";
+    struct plan made, kept;
+    const struct campaign_config c = fixture_campaign(states);
+    const struct bench_config bench = fixture_bench();
+    store_close(created_from(states), NULL);
+    assert_int_equal(number("PRAGMA user_version"), 2);
+    struct store *s = opened(STORE_READ);
+    assert_int_equal(plan_make(&c, &bench, &made, NULL), 0);
+    assert_int_equal(store_read_plan(s, &kept, NULL), 0);
+    assert_int_equal(kept.count, made.count);
+    for (int i = 0; i < made.count; i++)
+        assert_true(kept.points[i].pol_in == made.points[i].pol_in &&
+                    kept.points[i].pol_out == made.points[i].pol_out);
+    char *pol_in = store_read_meta(s, "pol_in");
+    assert_string_equal(pol_in, "s, p");
+    free(pol_in);
+    plan_clear(&made);
+    plan_clear(&kept);
+    store_close(s, NULL);
+    unlink(path);
+    store_close(created(), NULL);
+    assert_int_equal(number("PRAGMA user_version"), 1);
+}
+
+// Dark 1 mV, beam 2.001 V, signal 1 mV and 1 mV more for each point of the plan.
+static void a_file_of_version_1_is_read_and_written_on(void **state)
+{
+    (void)state;
+    char text[16384];
+    FILE *in = fopen("tests/golden/campaign_v1.sql", "r");
+    assert_non_null(in);
+    text[fread(text, 1, sizeof text - 1, in)] = 0;
+    fclose(in);
+    tamper(text);
+    struct store *s = opened(STORE_WRITE);
+    struct plan p;
+    struct reduction r;
+    assert_int_equal(store_read_plan(s, &p, NULL), 0);
+    assert_true(p.count == 8 && p.sweeps == 2 && p.points[6].done && !p.points[7].done);
+    for (int i = 0; i < p.count; i++)
+        assert_true(p.points[i].pol_in == POL_S && p.points[i].pol_out == POL_S);
+    assert_int_equal(reduce_campaign(s, &r, NULL), 0);
+    assert_true(r.count == 4 && r.beams == 2 && r.darks == 1 && r.polarisation == POL_S);
+    for (int i = 0; i < 4; i++) { // the elements of that time were the operator's: nothing over T
+        const double cosine = cos(units_rad(i % 2 ? 30 : 0));
+        const double ratio = r.points[i].f_per_sr * r.omega_sr * cosine;
+        assert_true(fabs(ratio / (1e-3 * (i + 2)) - 0.5) < 1e-9);
+    }
+    assert_int_equal(store_append_reduction(s, 1, &r, NULL, NULL), 0);
+    const struct store_reading dark = reading(3, 1, 1);
+    append(s, &dark);
+    reduction_clear(&r);
+    plan_clear(&p);
+    store_close(s, NULL);
+    assert_int_equal(number("PRAGMA user_version"), 1);
 }
 
 static void a_moved_file_is_noticed_at_the_next_reading(void **state)
@@ -896,6 +975,8 @@ int main(void)
         TEST(a_failed_fsync_reopens_before_the_next_row),
         TEST(readings_cannot_be_changed_by_accident),
         TEST(other_files_and_newer_ones_are_refused),
+        TEST(several_states_are_kept_and_make_version_2),
+        TEST(a_file_of_version_1_is_read_and_written_on),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
         TEST(a_cut_file_is_noticed_at_the_next_reading),
         TEST(a_removed_wal_loses_nothing),

@@ -34,20 +34,25 @@ static void links_are_taken_apart(void **state)
     struct link l;
     (void)state;
     assert_int_equal(link_parse("serial:/dev/ttyUSB0", LINK_TEXT, &l, NULL), 0);
-    assert_true(l.serial && l.baud == 115200 && l.parity == 'N' && l.stop == 1);
+    assert_true(l.kind == LINK_SERIAL && l.baud == 115200 && l.parity == 'N' && l.stop == 1);
     assert_string_equal(l.place, "/dev/ttyUSB0");
     assert_int_equal(
         link_parse("modbus-rtu:/dev/x?stop=2&baud=9600&parity=O", LINK_MODBUS, &l, NULL), 0);
-    assert_true(l.serial && l.baud == 9600 && l.parity == 'O' && l.stop == 2);
+    assert_true(l.kind == LINK_SERIAL && l.baud == 9600 && l.parity == 'O' && l.stop == 2);
     assert_int_equal(link_parse("modbus-rtu:/dev/x", LINK_MODBUS, &l, NULL), 0);
     assert_true(l.parity == 'E');
     assert_int_equal(link_parse("modbus-tcp:box", LINK_MODBUS, &l, NULL), 0);
-    assert_false(l.serial);
+    assert_int_equal(l.kind, LINK_TCP);
     assert_string_equal(l.place, "box");
     assert_string_equal(l.port, "502");
     assert_int_equal(link_parse("tcp:[::1]:4001", LINK_TEXT, &l, NULL), 0);
     assert_string_equal(l.place, "::1");
     assert_string_equal(l.port, "4001");
+    assert_int_equal(link_parse("usbtmc:1313:80aF", LINK_TEXT, &l, NULL), 0);
+    assert_true(l.kind == LINK_USBTMC && l.vendor == 0x1313 && l.product == 0x80af);
+    assert_string_equal(l.place, "");
+    assert_int_equal(link_parse("usbtmc:1313:8072:P00:1", LINK_TEXT, &l, NULL), 0);
+    assert_string_equal(l.place, "P00:1");
 }
 
 static void wrong_links_say_what_is_allowed(void **state)
@@ -77,6 +82,17 @@ static void wrong_links_say_what_is_allowed(void **state)
         {"tcp:host:65536", LINK_TEXT, "1..65535"},
         {"tcp:host:40x", LINK_TEXT, "1..65535"},
         {"tcp:[::1:4001", LINK_TEXT, "HOST:PORT"},
+        {"usbtmc:1313:8072", LINK_MODBUS, "unknown kind"},
+        {"usb:1313:8072", LINK_TEXT, "tcp:HOST:PORT or usbtmc:VID:PID:SERIAL"},
+        {"usbtmc:", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:1313", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:1313:", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:1313:807", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:131g:8072", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:0x1313:0x8072", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:1313:80721", LINK_TEXT, "four hexadecimal digits"},
+        {"usbtmc:1313:8072:", LINK_TEXT, "VID:PID:SERIAL"},
+        {"usbtmc:1313:8072:P 1", LINK_TEXT, "VID:PID:SERIAL"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {

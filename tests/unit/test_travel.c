@@ -46,10 +46,19 @@ static double load(struct setting *s, enum world_axis axis)
     return motion_at(&s->b.world.axis[axis], s->b.clk.t_ns).load;
 }
 
+static double travel_time_s(double distance, double speed, double acceleration)
+{
+    const struct bench_axis axis = {.speed = speed, .acceleration = acceleration};
+    return bench_axis_move_s(&axis, 0, distance);
+}
+
 static int move(struct setting *s, double theta_i, double theta_r, double sample,
                 struct travel_pose *ret, struct gon_error *err)
 {
-    const struct travel_pose target = {.at = {theta_i, theta_r, sample}};
+    struct travel_pose target = travel_stay();
+    target.at[PART_THETA_I] = theta_i;
+    target.at[PART_THETA_R] = theta_r;
+    target.at[PART_SAMPLE] = sample;
     return travel_move(s->in, &target, s->cancel, ret, err);
 }
 
@@ -160,11 +169,10 @@ static void an_axis_that_does_not_stop_is_reported(void **state)
     const int stops = s->b.axis[PART_THETA_R].stops;
     assert_int_equal(move(s, 0, 0, 0, &at, &err), 0);
     s->b.axis[PART_THETA_R].frozen = false;
-    const struct travel_pose target = {.at = {40, 40, STAY}};
     s->b.axis[PART_THETA_R].frozen = true;
     clk_sleep(&s->b.clk.clk, CLK_S(1), NULL); // what was seen longer ago is asked again
     // frozen from the start: it is told to stop first and does not
-    assert_int_equal(travel_move(s->in, &target, NULL, &at, &err), GON_E_DEVICE);
+    assert_int_equal(move(s, 40, 40, STAY, &at, &err), GON_E_DEVICE);
     assert_non_null(strstr(err.text, "axis theta_r: still moves 2 s after a stop"));
     assert_true(s->b.axis[PART_THETA_R].stops > stops);
     assert_true(s->b.clk.t_ns - start_ns < CLK_S(30));
@@ -245,7 +253,7 @@ static void a_cancel_ends_a_move_within_a_slice(void **state)
     s->b.clk.on_advance = NULL;
     assert_true(s->b.clk.t_ns - s->cancel_at_ns <= CLK_MS(100));
     assert_int_equal(travel_stop(s->in, NULL), 0); // the caller's, after the light
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < WORLD_AXES; i++)
         assert_false(motion_at(&s->b.world.axis[i], s->b.clk.t_ns + CLK_S(1)).moving);
     assert_true(load(s, WORLD_THETA_R) < 60);
 }
@@ -260,6 +268,199 @@ static void stations_by_name(void **state)
     assert_float_equal(pose.at[PART_SAMPLE], 30, 0);
     assert_int_equal(travel_station(s->in, "baem", &pose, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "\"baem\""));
+}
+
+// --- kinematics ----------------------------------------------------------------------------------
+
+static void made_again(struct setting *s)
+{
+    struct instrument_parts parts = simbench_parts(&s->b);
+    instrument_free(s->in);
+    assert_int_equal(instrument_new(&s->bench, &parts, &s->b.clk.clk, &s->in, NULL), 0);
+    assert_int_equal(travel_home(s->in, NULL, NULL), 0);
+}
+
+static void geometry_goes_through_the_kinematics(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose pose, at;
+    struct gon_error err;
+    assert_int_equal(travel_to_sample(s->in, 30, -40, &pose, &err), 0);
+    assert_true(pose.at[PART_THETA_I] == 30 && pose.at[PART_THETA_R] == -40 &&
+                pose.at[PART_SAMPLE] == 0 && isnan(pose.at[3]));
+    // the second axis becomes an arm that carries theta_i too, mounted 5 deg off
+    snprintf(s->bench.axes[1].name, BENCH_NAME, "arm");
+    s->bench.kinematics.rows_count = 2;
+    s->bench.kinematics.rows[0] = (struct bench_row){.axis = "theta_i", .theta_i = 1};
+    s->bench.kinematics.rows[1] =
+        (struct bench_row){.axis = "arm", .theta_i = 1, .theta_r = 1, .offset = -5};
+    made_again(s);
+    assert_int_equal(travel_to_sample(s->in, 30, -40, &pose, &err), 0);
+    assert_true(pose.at[1] == -15);
+    assert_int_equal(travel_move(s->in, &pose, NULL, &at, &err), 0);
+    assert_float_equal(load(s, WORLD_THETA_R), -15, 1e-9);
+    const struct kinematics_pose geometry = kinematics_forward(instrument_kinematics(s->in), at.at);
+    assert_float_equal(geometry.theta_i, 30, 1e-9);
+    assert_float_equal(geometry.theta_r, -40, 1e-9);
+}
+
+// --- keep-outs -----------------------------------------------------------------------------------
+
+static const double head[5][2] = {{25, -20}, {25, -35}, {85, -95}, {88, -60}, {60, -40}};
+
+static void fence(struct setting *s)
+{
+    struct bench_keep_out *k = &s->bench.keep_out[s->bench.keep_out_count++];
+    *k = (struct bench_keep_out){.name = "laser head", .vertices = 5};
+    memcpy(k->vertex, head, sizeof head);
+}
+
+// By winding: another test of being inside than the product's.
+static bool in_head(double x, double y)
+{
+    double turn = 0;
+    for (int i = 0; i < 5; i++) {
+        const double *a = head[i], *b = head[(i + 1) % 5];
+        turn += atan2((a[0] - x) * (b[1] - y) - (b[0] - x) * (a[1] - y),
+                      (a[0] - x) * (b[0] - x) + (a[1] - y) * (b[1] - y));
+    }
+    return fabs(turn) > 1;
+}
+
+struct guard {
+    struct setting *s;
+    int64_t seen_ns;
+    long looks, inside;
+};
+
+// Every millisecond of virtual time, motor and load.
+static void watch_head(void *ctx, int64_t t_ns)
+{
+    struct guard *g = ctx;
+    for (; g->seen_ns < t_ns; g->seen_ns += CLK_MS(1)) {
+        const struct motion_state i = motion_at(&g->s->b.world.axis[WORLD_THETA_I], g->seen_ns);
+        const struct motion_state r = motion_at(&g->s->b.world.axis[WORLD_THETA_R], g->seen_ns);
+        g->looks++;
+        g->inside += in_head(i.motor, r.motor) || in_head(i.load, r.load);
+    }
+}
+
+static double random_angle(uint64_t *state, double low, double high)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return low + (high - low) * ((double)(*state >> 11) * 0x1p-53);
+}
+
+// 400 moves to anywhere, with commands that are lost, carried out late or missed: the bench is
+// never inside, and what is refused is refused before anything moves.
+static void no_move_enters_a_keep_out(void **state)
+{
+    struct setting *s = *state;
+    struct guard g = {.s = s};
+    const char *text = getenv("GONIO_TEST_SEED");
+    uint64_t seed = text ? strtoull(text, NULL, 10) : 1906;
+    int moved = 0, refused = 0, blocked = 0, failed = 0;
+    print_message("seed %llu\n", (unsigned long long)seed);
+    fence(s);
+    made_again(s);
+    s->b.step_delay_s = 0.02; // between the axes' commands: they do not start together
+    g.seen_ns = s->b.clk.t_ns;
+    s->b.clk.on_advance = watch_head;
+    s->b.clk.ctx = &g;
+    for (int n = 0; n < 400; n++) {
+        struct travel_pose at;
+        struct gon_error err = {0};
+        const double i = random_angle(&seed, -5, 88), r = random_angle(&seed, -120, 120);
+        struct simbench_axis *hit = &s->b.axis[n % 2];
+        hit->swallow = n % 5 == 0;
+        hit->misses = n % 7 == 0;
+        const int before = s->b.axis[0].moves + s->b.axis[1].moves;
+        const int rc = move(s, i, r, STAY, &at, &err);
+        moved += rc == 0;
+        hit->swallow = false;
+        hit->misses = 0;
+        if (rc == GON_E_DEVICE && strstr(err.text, "no way")) {
+            refused++;
+            assert_int_equal(s->b.axis[0].moves + s->b.axis[1].moves, before);
+            blocked += !strstr(err.text, "keep-out \"laser head\": the target lies in it");
+        } else if (rc < 0) {
+            failed++;
+            assert_int_equal(travel_stop(s->in, NULL), 0);
+        }
+    }
+    s->b.clk.on_advance = NULL;
+    print_message(
+        "%d moved, %d refused (%d of them on the way), %d failed; %ld looks, %ld inside\n", moved,
+        refused, blocked, failed, g.looks, g.inside);
+    assert_int_equal(g.inside, 0);
+    assert_true(moved > 300 && refused > 10 && blocked < 10);
+}
+
+// --- the drive -----------------------------------------------------------------------------------
+
+static void from_above_is_the_same_the_other_way_round(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    s->bench.axes[PART_THETA_R].approach = BENCH_FROM_ABOVE;
+    assert_int_equal(move(s, STAY, 40, STAY, &at, NULL), 0); // up: past it and back
+    const int moves = s->b.axis[PART_THETA_R].moves;
+    assert_int_equal(move(s, STAY, 10, STAY, &at, NULL), 0);
+    assert_int_equal(s->b.axis[PART_THETA_R].moves, moves + 1);
+    assert_int_equal(move(s, STAY, 20, STAY, &at, NULL), 0);
+    assert_int_equal(s->b.axis[PART_THETA_R].moves, moves + 3);
+    assert_true(fabs(load(s, WORLD_THETA_R) - 20.015) < 1e-9); // the play's other end
+}
+
+static void stand_theta_r(void *ctx, int64_t t_ns)
+{
+    struct setting *s = ctx;
+    if (t_ns > s->cancel_at_ns) { // blocked: it says that it moves, and its encoder stands
+        motion_halt(&s->b.world.axis[WORLD_THETA_R], t_ns);
+        s->b.axis[PART_THETA_R].frozen = true;
+    }
+}
+
+static void an_axis_that_stands_while_it_moves_is_blocked(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    assert_int_equal(move(s, 0, 0, 0, &at, NULL), 0);
+    s->cancel_at_ns = s->b.clk.t_ns + CLK_S(1);
+    s->b.clk.on_advance = stand_theta_r;
+    s->b.clk.ctx = s;
+    assert_int_equal(move(s, STAY, 120, STAY, &at, &err), GON_E_DEVICE);
+    s->b.clk.on_advance = NULL;
+    assert_non_null(strstr(err.text, "axis theta_r: says that it moves but has stood at"));
+    assert_true(s->b.clk.t_ns - s->cancel_at_ns < CLK_S(2));
+}
+
+static void an_axis_that_lags_is_stopped_when_a_limit_is_set(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    s->bench.axes[PART_THETA_R].following_error = 1;
+    assert_int_equal(move(s, 40, 100, 0, &at, &err), 0); // a good axis stays within
+    s->cancel_at_ns = s->b.clk.t_ns + CLK_S(1);
+    s->b.clk.on_advance = stand_theta_r;
+    s->b.clk.ctx = s;
+    assert_int_equal(move(s, STAY, -60, STAY, &at, &err), GON_E_DEVICE);
+    s->b.clk.on_advance = NULL;
+    assert_non_null(strstr(err.text, "off its way (following_error 1)"));
+    assert_true(s->b.clk.t_ns - s->cancel_at_ns < CLK_S(0.6)); // before it counts as standing
+}
+
+static void retries_are_the_axiss_own(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    s->bench.axes[PART_THETA_R].retries = 0;
+    s->b.axis[PART_THETA_R].misses = 1;
+    assert_int_equal(move(s, STAY, 50, STAY, &at, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "after 1 tries"));
 }
 
 int main(void)
@@ -280,6 +481,12 @@ int main(void)
         T(targets_beyond_the_travel_are_refused_before_moving),
         T(a_cancel_ends_a_move_within_a_slice),
         T(stations_by_name),
+        T(geometry_goes_through_the_kinematics),
+        T(no_move_enters_a_keep_out),
+        T(from_above_is_the_same_the_other_way_round),
+        T(an_axis_that_stands_while_it_moves_is_blocked),
+        T(an_axis_that_lags_is_stopped_when_a_limit_is_set),
+        T(retries_are_the_axiss_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

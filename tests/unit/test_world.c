@@ -243,7 +243,7 @@ static double detected(double theta_i, double theta_r, double sample_mm)
 {
     struct world_spec w;
     world_defaults(&w);
-    struct optics_scene s = {theta_i, theta_r, sample_mm, 0.05};
+    struct optics_scene s = {theta_i, theta_r, sample_mm, 0.05, NULL};
     return optics_detected_w(&w.optics, &s);
 }
 
@@ -255,7 +255,7 @@ static void a_lambertian_sample_gives_the_textbook_power(void **state)
     w.optics.sample.ks = 0;
     w.optics.sample.kd = 0.5;
     w.optics.diffuse = BRDF_DIFFUSE_LAMBERT;
-    struct optics_scene s = {30, -60, 0, 0.05};
+    struct optics_scene s = {30, -60, 0, 0.05, NULL};
     double omega = PI * 8 * 8 / (500.0 * 500.0);
     near(optics_solid_angle_sr(&w.optics), omega, 1e-15);
     near(optics_detected_w(&w.optics, &s), 0.05 * 0.5 / PI * omega * 0.5, 1e-15);
@@ -291,7 +291,7 @@ static void a_term_that_is_off_adds_nothing(void **state)
     (void)state;
     struct world_spec w;
     world_defaults(&w);
-    struct optics_scene s = {20, 160, 30, 0.05};
+    struct optics_scene s = {20, 160, 30, 0.05, NULL};
     w.optics.off = 1u << optics_term("beam");
     assert_true(optics_detected_w(&w.optics, &s) == 0);
     assert_int_equal(optics_term("ghost"), -1);

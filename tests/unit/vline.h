@@ -3,7 +3,8 @@
 // for on it goes to a simulated port instead, and waiting moves a virtual clock. It works by
 // defining the calls of libc here: they take precedence in the whole program, libmodbus included.
 // So thousands of timeouts cost no time, and the same seed gives the same bytes at the same times.
-// One line a program.
+// vline_begin_tcp is the same for a TCP connection: each new one forgets what was under way in the
+// one before. One line a program.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -19,24 +20,27 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/select.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 struct vline {
     int master;
     dev_t device;
+    bool tcp;
+    ino_t socket; // of the connection
     struct port *port;
     struct clk_virtual clk;
     char link[96]; // "serial:/dev/pts/N"
-    char bus[96];  // "modbus-rtu:/dev/pts/N?baud=115200"
+    char bus[96];  // "modbus-rtu:/dev/pts/N?baud=115200"; "modbus-tcp:192.0.2.1:502"
     uint8_t in[1 << 16];
     size_t have;
-    size_t write_most;      // bytes taken by one write; 0: all
-    bool stuck;             // takes nothing: the line is full
-    int64_t hangup_ns;      // the plug is pulled then
-    int64_t cancel_ns;      // and this is requested then
+    size_t write_most; // bytes taken by one write; 0: all
+    bool stuck;        // takes nothing: the line is full
+    int64_t hangup_ns; // the plug is pulled then
+    int64_t cancel_ns; // and this is requested then
     struct cancel *cancel;
-    int64_t longest_ns;     // wait without a turn of the clock
+    int64_t longest_ns; // wait without a turn of the clock
     int64_t turn_ns;
     uint64_t waits;
 };
@@ -46,7 +50,10 @@ static struct vline vline;
 static inline bool vline_is(int fd)
 {
     struct stat s;
-    return vline.port && fstat(fd, &s) == 0 && S_ISCHR(s.st_mode) && s.st_rdev == vline.device;
+    if (!vline.port || fstat(fd, &s) != 0)
+        return false;
+    return vline.tcp ? S_ISSOCK(s.st_mode) && s.st_ino == vline.socket
+                     : S_ISCHR(s.st_mode) && s.st_rdev == vline.device;
 }
 
 static inline bool vline_hung_up(void)
@@ -110,8 +117,8 @@ static inline bool vline_wait(int64_t until_ns)
 #define VLINE_REAL(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
 
 // By their assembler names: libc declares that poll only writes its array, which is not so.
-int vline_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout, const sigset_t *mask)
-    __asm__("ppoll");
+int vline_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout,
+                const sigset_t *mask) __asm__("ppoll");
 int vline_poll(struct pollfd *fds, nfds_t n, int timeout_ms) __asm__("poll");
 
 int vline_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout, const sigset_t *mask)
@@ -183,11 +190,30 @@ ssize_t write(int fd, const void *from, size_t size)
     return (ssize_t)size;
 }
 
-static inline struct clk *vline_begin(struct port *port)
+ssize_t recv(int fd, void *to, size_t size, int flags)
+{
+    return vline_is(fd) ? read(fd, to, size) : VLINE_REAL(recv)(fd, to, size, flags);
+}
+
+ssize_t send(int fd, const void *from, size_t size, int flags)
+{
+    return vline_is(fd) ? write(fd, from, size) : VLINE_REAL(send)(fd, from, size, flags);
+}
+
+int connect(int fd, const struct sockaddr *address, socklen_t size)
+{
+    struct stat s;
+    if (!vline.tcp || address->sa_family != AF_INET || fstat(fd, &s) != 0)
+        return VLINE_REAL(connect)(fd, address, size);
+    vline.socket = s.st_ino;
+    vline.have = 0;
+    port_hangup(vline.port);
+    return 0;
+}
+
+static inline struct clk *vline_begin_clock(struct port *port)
 {
     static struct clk_ops ops;
-    struct stat s;
-    char name[64];
     if (vline.master > 0)
         close(vline.master);
     memset(&vline, 0, sizeof vline);
@@ -197,12 +223,29 @@ static inline struct clk *vline_begin(struct port *port)
     ops.sleep_until = vline_sleep_until;
     clk->ops = &ops;
     vline.turn_ns = vline.clk.t_ns;
+    vline.port = port;
+    return clk;
+}
+
+static inline struct clk *vline_begin_tcp(struct port *port)
+{
+    struct clk *clk = vline_begin_clock(port);
+    vline.tcp = true;
+    snprintf(vline.link, sizeof vline.link, "tcp:192.0.2.1:4001"); // of no network at all
+    snprintf(vline.bus, sizeof vline.bus, "modbus-tcp:192.0.2.1:502");
+    return clk;
+}
+
+static inline struct clk *vline_begin(struct port *port)
+{
+    struct stat s;
+    char name[64];
+    struct clk *clk = vline_begin_clock(port);
     vline.master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
     if (vline.master < 0 || grantpt(vline.master) || unlockpt(vline.master) ||
         ptsname_r(vline.master, name, sizeof name) || stat(name, &s))
         abort();
     vline.device = s.st_rdev;
-    vline.port = port;
     snprintf(vline.link, sizeof vline.link, "serial:%s", name);
     snprintf(vline.bus, sizeof vline.bus, "modbus-rtu:%s", name);
     return clk;

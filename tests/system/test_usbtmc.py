@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: MIT
+"""USBTMC by the real libusb: a simulated power meter (tests/usb/usbsim) on nodes of umockdev, asked by
+gonio's own link (tests/usb/linkask) and by pyvisa-py, which knows nothing of gonio."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from conftest import BUILD, Program
+
+METER = "usbtmc:1313:8072"
+IDENTITY = "Thorlabs,PM100USB,P0000001,1.4.0"
+PRELOAD = "libumockdev-preload.so.0"
+
+pytestmark = pytest.mark.skipif(not shutil.which("umockdev-wrapper") or not (BUILD / "tests/usbsim").exists(),
+                                reason="umockdev is not installed")
+
+
+def preload(program):
+    """What umockdev-wrapper sets; a program with AddressSanitizer wants that before all others."""
+    needs = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
+    asan = re.search(r"=> (\S*libasan\S*)", needs)
+    return f"{asan.group(1)} {PRELOAD}" if asan else PRELOAD
+
+
+class Dialogue(Program):
+    """A program that answers each line with a line."""
+
+    def __init__(self, argv, log, env):
+        super().__init__(argv, log, env={"LD_PRELOAD": preload(argv[0]), **env}, stdin=subprocess.PIPE)
+
+    def say(self, line):
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def hear(self):
+        return self.wait_line("")
+
+    def ask(self, line):
+        self.say(line)
+        return self.hear()
+
+    def close(self):
+        self.process.stdin.close()
+        return self.process.wait(10)
+
+
+class Usb:
+    """The simulated bus and whoever asks on it."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.simulator = Dialogue([BUILD / "tests/usbsim"], folder / "usbsim.log", {})
+        self.env = {"UMOCKDEV_DIR": self.simulator.wait_line("dir ")[4:]}
+        self.clients = []
+
+    def tell(self, line):
+        said = self.simulator.ask(line)
+        assert said.startswith("ok"), f"{line}: {said}"
+        return said[3:]
+
+    def seen(self, request):
+        return int(self.tell(f"seen 0 {request}"))
+
+    def link(self, text=METER):
+        """The client and what it said when it opened the link."""
+        client = Dialogue([BUILD / "tests/linkask", text], self.folder / "linkask.log", self.env)
+        said = client.hear()
+        if said.startswith("ok open"):
+            self.clients.append(client)
+        else:
+            assert client.process.wait(10) == 1
+        return client, said
+
+    def open(self, text=METER):
+        client, said = self.link(text)
+        assert said.startswith("ok open"), said
+        return client
+
+    def close(self):
+        for client in self.clients:
+            if client.process.poll() is None:
+                assert client.close() == 0, client.errors()
+        assert self.simulator.close() == 0, self.simulator.errors()
+
+
+@pytest.fixture
+def usb(tmp_path):
+    bus = Usb(tmp_path)
+    yield bus
+    bus.close()
+
+
+@pytest.fixture
+def meter(usb):
+    usb.tell("plug 0 1 2")
+    return usb.open()
+
+
+def value(said):
+    """Which measurement an answer was."""
+    number = re.match(r"ok (\S+) \(", said)
+    assert number, said
+    return round((float(number.group(1)) - 1e-3) * 1e9)
+
+
+def milliseconds(said):
+    return float(re.search(r"\((\S+) ms\)$", said).group(1))
+
+
+ABORT_IN, CLEAR, REMOTE = 3, 5, 160
+
+
+def test_a_meter_is_identified_and_read(usb, meter):
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+    assert [value(meter.ask("ask MEAS:POW?")) for _ in range(20)] == list(range(1, 21))
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    assert meter.ask("ask SENS:CORR:WAV?").startswith("ok 1.5500E+03")
+    assert meter.ask("ask SYST:ERR?").startswith('ok 0,"No error"')
+    assert (usb.seen(REMOTE), usb.seen(CLEAR), usb.seen(ABORT_IN)) == (1, 1, 0)
+
+
+def test_a_long_answer_comes_whole(meter):
+    for size in (51, 52, 53, 4096, 5000):
+        said = meter.ask(f"bytes LONG? {size}")
+        text = bytes(ord("a") + i % 26 for i in range(size - 1)) + b"\n"
+        assert said.startswith(f"ok {size} {crc32c(text):08x} "), said
+
+
+def crc32c(data):
+    crc = 0xffffffff
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0x82f63b78 if crc & 1 else 0)
+    return crc ^ 0xffffffff
+
+
+@pytest.mark.parametrize("fault, said, aborts", [
+    ("stall_in", "refused by the device (stall)", 0),
+    ("stall_out", "refused by the device (stall)", 0),
+    ("wrong_tag", "the answer to another question (wrong tag)", 1),
+    ("wrong_complement", "the answer to another question (wrong tag)", 1),
+    ("huge", "an answer of an impossible size", 1),
+    ("deaf", "no answer in 500 ms", 1),
+])
+def test_a_fault_is_reported_and_mended(usb, meter, fault, said, aborts):
+    usb.tell(f"fault 0 {fault} 1")
+    answer = meter.ask("ask MEAS:POW?")
+    assert answer.startswith("error link ") and said in answer, answer
+    again = value(meter.ask("ask MEAS:POW?"))
+    assert value(meter.ask("ask MEAS:POW?")) == again + 1
+    assert (usb.seen(ABORT_IN), usb.seen(CLEAR)) == (aborts, 2)
+
+
+def test_short_packets_and_split_answers_are_put_together(usb, meter):
+    for fault in ("short", "split"):
+        usb.tell(f"fault 0 {fault} 1")
+        assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+    assert usb.seen(CLEAR) == 1
+
+
+def test_a_query_can_be_cancelled(usb, meter):
+    usb.tell("delay 0 400")
+    answer = meter.ask("stop 100 MEAS:POW?")
+    print(answer)
+    assert answer.startswith("error canceled ") and 95 < milliseconds(answer) < 300, answer
+    assert value(meter.ask("ask MEAS:POW?")) == 2
+
+
+def test_a_long_wait_gives_the_clock_its_turn(usb, meter):
+    usb.tell("mute 0 1")
+    assert milliseconds(meter.ask("ask MEAS:POW?")) >= 500
+    longest = float(re.match(r"ok (\S+) ", meter.ask("turns")).group(1))
+    print("longest without a turn:", longest, "ms")
+    assert 45 < longest < 200  # slices of 50 ms, and a loaded machine
+
+
+def test_a_late_answer_is_not_taken_for_the_next(usb, meter):
+    usb.tell("delay 0 700")
+    answer = meter.ask("ask MEAS:POW?")
+    assert "no answer in 500 ms" in answer and milliseconds(answer) < 600, answer
+    assert value(meter.ask("ask MEAS:POW?")) == 2
+    assert value(meter.ask("ask MEAS:POW?")) == 3
+
+
+def test_clearing_that_is_pending_is_waited_for(usb, meter):
+    usb.tell("fault 0 deaf 1")
+    assert "no answer" in meter.ask("ask MEAS:POW?")
+    usb.tell("fault 0 pending 5")
+    assert value(meter.ask("ask MEAS:POW?")) == 1
+    usb.tell("fault 0 deaf 1")
+    assert "no answer" in meter.ask("ask MEAS:POW?")
+    usb.tell("fault 0 pending 1000")
+    assert meter.ask("ask MEAS:POW?").startswith("error device ")
+    usb.tell("fault 0 pending 0")
+    assert value(meter.ask("ask MEAS:POW?")) == 2
+
+
+def test_unplugging_in_mid_query_is_reported_at_once(usb, meter):
+    usb.tell("mute 0 1")
+    usb.tell("after 100 unplug 0")
+    answer = meter.ask("ask MEAS:POW?")
+    print(answer)
+    assert answer.startswith("error gone ") and "unplugged" in answer, answer
+    assert milliseconds(answer) < 300
+    assert "not open since it hung up" in meter.ask("ask MEAS:POW?")
+    assert "no such device" in meter.ask("reopen")
+
+
+def test_the_device_is_found_again_by_its_serial_number(usb, meter):
+    assert value(meter.ask("ask MEAS:POW?")) == 1
+    usb.tell("unplug 0")
+    assert meter.ask("ask MEAS:POW?").startswith("error gone ")
+    usb.tell("plug 1 1 3")  # another meter takes its place
+    answer = meter.ask("reopen")
+    assert answer.startswith("error gone ") and "no device with the serial 'P0000001'" in answer, answer
+    usb.tell("plug 0 3 77")
+    assert meter.ask("reopen").startswith("ok")
+    assert value(meter.ask("ask MEAS:POW?")) == 2
+
+
+def test_of_two_devices_the_serial_number_chooses(usb):
+    usb.tell("plug 0 1 2")
+    usb.tell("plug 1 2 3")
+    _, said = usb.link()
+    assert "give the serial: " in said and f"{METER}:P0000001" in said and f"{METER}:P0000002" in said, said
+    assert usb.open(f"{METER}:P0000002").ask("ask *IDN?").startswith("ok ")
+    _, said = usb.link(f"{METER}:P0000003")
+    assert "no device with the serial 'P0000003'" in said, said
+
+
+def test_who_comes_second_hears_that_it_is_in_use(usb, meter):
+    _, said = usb.link()  # by whom is not said here: umockdev hides whose node it is
+    assert said.startswith("error refused ") and "in use by" in said, said
+    assert value(meter.ask("ask MEAS:POW?")) == 1
+    assert meter.close() == 0
+    assert value(usb.open().ask("ask MEAS:POW?")) == 2
+
+
+def open_to_all(testbed):
+    """Its sockets too, which are in folders of their own."""
+    for folder, _, files in os.walk(testbed):
+        os.chmod(folder, 0o777)
+        for path in (os.path.realpath(f"{folder}/{name}") for name in files if "/ioctl" in folder):
+            os.chmod(path, 0o777)
+            os.chmod(os.path.dirname(path), 0o777)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody without permission")
+def test_who_may_not_open_it_hears_which_rule_is_missing(usb):
+    usb.tell("plug 0 1 2")
+    open_to_all(usb.env["UMOCKDEV_DIR"])
+    os.chmod(usb.env["UMOCKDEV_DIR"] + "/dev/bus/usb/001/002", 0o600)
+    try:
+        done = subprocess.run([BUILD / "tests/linkask", METER], user=65534, group=65534, extra_groups=[],
+                              env={**os.environ, **usb.env, "LD_PRELOAD": preload(BUILD / "tests/linkask")},
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=20, check=False)
+    except PermissionError:
+        pytest.skip("the build is closed to others")
+    assert done.stdout.startswith("error refused ") and "permission denied on /dev/bus/usb/001/002" in done.stdout
+    assert 'ATTR{idVendor}=="1313", ATTR{idProduct}=="8072"' in done.stdout
+
+
+def test_nothing_there_is_said(usb):
+    _, said = usb.link()
+    assert said.startswith("error gone ") and "is it plugged in and switched on?" in said, said
+
+
+PEER = """
+import sys, pyvisa
+meter = pyvisa.ResourceManager("@py").open_resource(sys.argv[1])
+meter.timeout = 2000
+print(meter.query("*IDN?").strip())
+meter.write("SENS:CORR:WAV 633")
+print(float(meter.query("SENS:CORR:WAV?")))
+for i in range(3):
+    print(round((float(meter.query("MEAS:POW?")) - 1e-3) * 1e9))
+meter.write("LONG? 5000")
+print(len(meter.read_raw()))
+meter.close()
+"""
+
+
+def test_an_independent_peer_understands_the_device(usb):
+    pytest.importorskip("pyvisa_py")
+    usb.tell("plug 0 1 2")
+    peer = subprocess.run([sys.executable, "-c", PEER, "USB0::0x1313::0x8072::P0000001::INSTR"],
+                          env={**os.environ, **usb.env, "LD_PRELOAD": PRELOAD}, timeout=30,
+                          capture_output=True, text=True, check=False)
+    assert peer.returncode == 0, peer.stderr
+    assert peer.stdout.split("\n")[:-1] == [IDENTITY, "633.0", "1", "2", "3", "5000"]
