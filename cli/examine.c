@@ -51,8 +51,8 @@ static void tell_open(const struct examine *e, const char *who, const char *text
 // --- first contact -------------------------------------------------------------------------------
 
 static int meet_laser(const struct examine *e, const char *link, struct profile **ret_profile,
-                      struct laser **ret_laser,
-                      char ret_identity[IDENTITY], bool *ret_opened, struct gon_error *err)
+                      struct laser **ret_laser, char ret_identity[IDENTITY], bool *ret_opened,
+                      struct gon_error *err)
 {
     const char *driver = e->bench->laser.driver;
     struct laser *l;
@@ -71,12 +71,13 @@ static int meet_laser(const struct examine *e, const char *link, struct profile 
 }
 
 static int meet_detector(const struct examine *e, const char *link, struct profile **ret_profile,
-                         struct detector **ret_detector,
-                         char ret_identity[IDENTITY], bool *ret_opened, struct gon_error *err)
+                         struct detector **ret_detector, char ret_identity[IDENTITY],
+                         bool *ret_opened, struct gon_error *err)
 {
     const char *driver = e->bench->detector.driver;
     struct detector *d;
-    int rc = device_open_detector(driver, e->bench->folder, ret_profile, link, e->clk, NULL, &d, err);
+    int rc =
+        device_open_detector(driver, e->bench->folder, ret_profile, link, e->clk, NULL, &d, err);
     *ret_opened = rc >= 0;
     if (rc < 0)
         return rc;
@@ -224,8 +225,7 @@ static void tell_detector(const struct examine *e, struct detector *d, const cha
     if (rc >= 0)
         rc = d->ops->condition(d, &flags, &err);
     if (rc < 0) {
-        tell_talk(e, "detector", e->bench->detector.link,
-                  e->bench->detector.driver, &err);
+        tell_talk(e, "detector", e->bench->detector.link, e->bench->detector.driver, &err);
         return;
     }
     if (flags & DETECTOR_UNLOCKED)

@@ -125,8 +125,8 @@ enum instrument_part instrument_lost(const struct instrument *in)
 
 static int make_axis(struct instrument *in, struct motor *m, struct bus *bus, struct gon_error *err)
 {
-    return device_new_axis(m->config->driver, in->bench->folder, &m->profile, bus,
-                           m->config->unit, &m->axis, err);
+    return device_new_axis(m->config->driver, in->bench->folder, &m->profile, bus, m->config->unit,
+                           &m->axis, err);
 }
 
 static int connect_bus(struct instrument *in, struct motor *m, struct gon_error *err)
@@ -340,8 +340,9 @@ bool instrument_free(struct instrument *in)
         if (in->motor[i].axis) {
             in->motor[i].axis->ops->stop(in->motor[i].axis, NULL);
             in->motor[i].axis->ops->free(in->motor[i].axis);
-            free(in->motor[i].profile);
         }
+    for (int i = 0; i < INSTRUMENT_AXES; i++)
+        free(in->motor[i].profile); // also of an axis that could not be made
     for (int i = 0; i < BENCH_BUSES; i++)
         bus_close(in->bus[i]);
     if (in->detector)

@@ -4,20 +4,17 @@
 #include "drivers/by_profile.h"
 #include "drivers/profile.h"
 
-static int need(const char *driver, const char *folder, enum profile_role role, const char *kind,
-                struct profile **profile, struct gon_error *err)
+static int need(const char *driver, const char *folder, struct profile **profile,
+                struct gon_error *err)
 {
-    int rc = *profile ? 0 : profile_open(driver, folder, profile, err);
-    if (rc == 0 && (*profile)->role != (int)role)
-        return gon_fail(err, GON_E_INPUT, "the profile '%s' is not one of %s", driver, kind);
-    return rc;
+    return *profile ? 0 : profile_open(driver, folder, profile, err);
 }
 
 int device_open_laser(const char *driver, const char *folder, struct profile **profile,
                       const char *link, struct clk *clk, const struct cancel *cancel,
                       struct laser **ret_laser, struct gon_error *err)
 {
-    int rc = need(driver, folder, PROFILE_LASER, "a laser", profile, err);
+    int rc = need(driver, folder, profile, err);
     return rc < 0 ? rc : laser_by_profile(*profile, link, clk, cancel, ret_laser, err);
 }
 
@@ -25,16 +22,17 @@ int device_open_detector(const char *driver, const char *folder, struct profile 
                          const char *link, struct clk *clk, const struct cancel *cancel,
                          struct detector **ret_detector, struct gon_error *err)
 {
-    int rc = need(driver, folder, PROFILE_DETECTOR, "a detector", profile, err);
+    int rc = need(driver, folder, profile, err);
     return rc < 0 ? rc : detector_by_profile(*profile, link, clk, cancel, ret_detector, err);
 }
 
 int device_new_axis(const char *driver, const char *folder, struct profile **profile,
                     struct bus *bus, int unit, struct axis **ret_axis, struct gon_error *err)
 {
-    int rc = need(driver, folder, PROFILE_AXIS, "an axis", profile, err);
-    if (rc == 0 && (*profile)->protocol != PROFILE_MODBUS)
-        rc = gon_fail(err, GON_E_INPUT, "the profile '%s' is not one of a Modbus bus", driver);
+    int rc = need(driver, folder, profile, err);
+    if (rc == 0 && ((*profile)->role != PROFILE_AXIS || (*profile)->protocol != PROFILE_MODBUS))
+        rc = gon_fail(err, GON_E_INPUT, "the profile '%s' is not one of an axis on a Modbus bus",
+                      driver);
     if (rc < 0)
         return rc;
     *ret_axis = axis_by_profile(*profile, bus, unit);

@@ -80,8 +80,8 @@ static struct sim_modbus slave;
 static struct clk *begin_modbus(bool tcp, int seed)
 {
     sim_modbus_init(&slave, tcp, 0, REPLY_NS);
-    sim_modbus_add(&slave, (struct sim_modbus_unit){
-                               .id = 1, .read = read_numbered, .write = write_nothing});
+    sim_modbus_add(
+        &slave, (struct sim_modbus_unit){.id = 1, .read = read_numbered, .write = write_nothing});
     return begin(&slave.port, tcp, seed);
 }
 

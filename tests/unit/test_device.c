@@ -44,6 +44,10 @@ static void one_of_another_role_or_name_is_an_error_of_the_bench_file(void **sta
                      GON_E_INPUT);
     assert_non_null(strstr(err.text, "no profile 'cobolt'"));
     assert_null(p);
+    assert_int_equal(device_open_laser("sr830", "configs", &p, "serial:/dev/not-there",
+                                       clk_system(), NULL, &l, &err),
+                     GON_E_INPUT);
+    assert_string_equal(err.text, "profile sr830 is not of a laser");
     assert_int_equal(device_new_axis("sr830", "configs", &p, NULL, 1, &a, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "the profile 'sr830' is not one of an axis"));
     free(p);
