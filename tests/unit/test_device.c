@@ -51,6 +51,11 @@ static void one_of_another_role_or_name_is_an_error_of_the_bench_file(void **sta
     assert_int_equal(device_new_axis("sr830", "configs", &p, NULL, 1, &a, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "the profile 'sr830' is not one of an axis"));
     free(p);
+    struct profile *inputs = calloc(1, sizeof *inputs);
+    inputs->role = PROFILE_INPUTS;
+    inputs->protocol = PROFILE_MODBUS;
+    assert_int_equal(device_new_axis("door", "configs", &inputs, NULL, 1, &a, &err), GON_E_INPUT);
+    free(inputs);
 }
 
 int main(void)
