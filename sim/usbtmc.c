@@ -7,8 +7,8 @@ enum { MSG_OUT = 1, REQUEST_IN = 2, HEADER = 12 };
 enum { SUCCESS = 0x01, PENDING = 0x02, FAILED = 0x80, NOT_IN_PROGRESS = 0x81 };
 
 static const char *const fault_names[SIM_USB_FAULTS] = {
-    "stall_in", "stall_out", "wrong_tag",   "wrong_complement", "wrong_id", "huge", "short",
-    "split",    "empty_end", "zero_packet", "pending",          "stale",    "deaf"};
+    "stall_in", "stall_out", "wrong_tag", "wrong_complement", "wrong_id", "huge",  "small",
+    "short",    "split",     "empty_end", "zero_packet",      "pending",  "stale", "deaf"};
 
 bool sim_usbtmc_set_fault(struct sim_usbtmc *u, const char *name, unsigned count)
 {
@@ -103,6 +103,10 @@ static void corrupt(struct sim_usbtmc *u, size_t payload)
         b[0] = MSG_OUT + 126;
     if (strikes(u, SIM_USB_HUGE))
         memset(b + 4, 0xff, 4);
+    if (payload > 1 && strikes(u, SIM_USB_SMALL)) {
+        b[4] = (uint8_t)(payload / 2);
+        b[5] = (uint8_t)(payload / 2 >> 8);
+    }
     if (payload > 1 && strikes(u, SIM_USB_SHORT))
         u->pause = HEADER + 1;
 }
