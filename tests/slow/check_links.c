@@ -21,7 +21,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-enum { READS = 600000, BARE_READS = 60000, DIGIT_READS = 200000, SEED = 20261126 };
+enum { READS = 600000, BARE_READS = 60000, LIMIT_READS = 200000, SEED = 20261126 };
 
 static int failed;
 
@@ -50,18 +50,24 @@ static void report_usb(struct links_policy p, int reads, int seed)
     free(p.profile);
 }
 
-// What a line without a checksum cannot show stays within the bounds of the profile.
-static void report_digits(int seed)
+// What a line without a checksum cannot show stays within the bounds of the profile; and what the
+// two forms of question, the time stamp and the echo are for.
+static void report_limits(int seed)
 {
-    const struct links_serial s = links_digits();
-    const struct links_tally t = links_measure_serial(&s, DIGIT_READS, seed);
-    printf(
-        "Left out of 'serial', and of the changes in 'serial, echo': a number that lost or got a "
-        "digit, a sign or a blank.\n%d reads with those and other changes: %" PRIu64
-        " faults, %d wrong accepted, %d beyond the profile's bounds  %s\n",
-        t.reads, t.faults, t.wrong, t.beyond, t.beyond ? "FAILED" : "ok");
+    const struct links_serial digits = links_digits(), alike = links_alike();
+    const struct links_tally t = links_measure_serial(&digits, LIMIT_READS, seed);
+    const struct links_tally one = links_measure_serial(&alike, LIMIT_READS, seed);
+    printf("Not in the table: no line without a checksum shows that a number lost or got a digit, "
+           "a sign or a blank.\n"
+           "%d reads with such faults: %" PRIu64 " faults, %d wrong accepted, %d beyond the "
+           "profile's bounds  %s\n"
+           "%d reads by one question, without echo, time stamp and checksum: %d wrong  %s\n",
+           t.reads, t.faults, t.wrong, t.beyond, t.beyond ? "FAILED" : "ok", one.reads, one.wrong,
+           one.wrong ? "as expected" : "FAILED");
     failed += t.beyond > 0;
-    free(s.policy.profile);
+    failed += one.wrong == 0;
+    free(digits.policy.profile);
+    free(alike.policy.profile);
 }
 
 int main(int argc, char **argv)
@@ -82,10 +88,11 @@ int main(int argc, char **argv)
            links_measure_bare_bus(true, BARE_READS, seed));
     report_serial(links_summed(), reads, seed);
     report_serial(links_plain(), reads, seed);
+    report_serial(links_stamped(), reads, seed);
     report_serial(links_echoed(), reads, seed);
     report_usb(links_meter(), reads, seed);
     report_usb(links_lockin(), reads, seed);
-    report_digits(seed);
+    report_limits(seed);
     printf("links: %s\n", failed ? "FAILED" : "ok, no wrong value");
     return failed != 0;
 }

@@ -33,6 +33,7 @@ static inline struct clk *links_begin(struct port *device, bool tcp, unsigned fa
     links_line.all = true;
     links_line.only = faults;
     links_line.one_in = LINKS_ONE_IN * (unsigned)__builtin_popcount(faults) / NOISY_ALL;
+    links_line.soon_ns = 4 * LINKS_REPLY_NS; // between the next question and its answer
     links_line.late_most_ns = links_line.double_most_ns = LINKS_LATE_NS;
     return tcp ? vline_begin_tcp(&links_line.port) : vline_begin(&links_line.port);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // drivers/session.h and drivers/message.h on a bad serial line, asked as the SR830's profile asks:
-// as it is, with a checksum, and by a device that repeats its command.
+// as it is, with a checksum, and by a device that repeats its command; and as the Keithley 6485's,
+// which has one question only and a time stamp in its answers.
 //
 // A line without a checksum cannot show that a number lost a byte, or that one became another
 // digit, a sign or a blank, or was added to it. Those are left out there, all other bytes are not;
@@ -22,10 +23,31 @@ struct links_serial {
 static inline struct links_serial links_plain(void)
 {
     return (struct links_serial){
-        {"serial", links_profile("sr830"), {"snap_wide", "snap"}, {"SNAP?1,9,2", "SNAP?1,9"}},
-        LINKS_ALL_FAULTS - (1u << NOISY_HEADLESS),
-        LINKS_OF_NUMBERS,
-        LINKS_BESIDE_NUMBERS};
+        .policy = {.name = "serial, two forms",
+                   .profile = links_profile("sr830"),
+                   .asks = {"snap_wide", "snap"},
+                   .commands = {"SNAP?1,9,2", "SNAP?1,9"},
+                   .signals = {"x", "x"},
+                   .scale = 1,
+                   .begin = {"sync", "range"}},
+        .faults = LINKS_ALL_FAULTS - (1u << NOISY_HEADLESS),
+        .garbage_lacks = LINKS_OF_NUMBERS,
+        .changed_lacks = LINKS_BESIDE_NUMBERS,
+    };
+}
+
+static inline struct links_serial links_stamped(void)
+{
+    struct links_serial s = links_plain();
+    free(s.policy.profile);
+    s.policy = (struct links_policy){.name = "serial, time stamp",
+                                     .profile = links_profile("keithley-6485"),
+                                     .asks = {"read", "read"},
+                                     .commands = {"READ?", "READ?"},
+                                     .signals = {"current_a", "current_a"},
+                                     .scale = 1e-3,
+                                     .begin = {"sync"}};
+    return s;
 }
 
 static inline struct links_serial links_summed(void)
@@ -47,6 +69,7 @@ static inline struct links_serial links_echoed(void)
     struct profile_exchange *wide = &p->exchanges[profile_exchange(p, "snap_wide")];
     s.policy.name = "serial, echo";
     s.policy.commands[0] = "SNAP?2,9";
+    s.policy.signals[0] = "y";
     snprintf(wide->send, sizeof wide->send, "SNAP?2,9");
     snprintf(wide->answer, sizeof wide->answer, "{y},{frequency_hz}");
     *wide->believe = 0;
@@ -57,7 +80,16 @@ static inline struct links_serial links_echoed(void)
     return s;
 }
 
-// What is left out elsewhere, and nothing else.
+// One question alone: a double that comes after the next question is the answer to that.
+static inline struct links_serial links_alike(void)
+{
+    struct links_serial s = links_plain();
+    s.policy.asks[0] = s.policy.asks[1];
+    s.policy.commands[0] = s.policy.commands[1];
+    return s;
+}
+
+// What is left out elsewhere.
 static inline struct links_serial links_digits(void)
 {
     struct links_serial s = links_plain();
@@ -89,7 +121,7 @@ static inline struct links_tally links_measure_serial(const struct links_serial 
         fprintf(stderr, "check_links: %s\n", err.text);
         exit(1);
     }
-    links_begin_session(session, (const char *const[]){"sync", "range", NULL});
+    links_begin_session(session, &s->policy);
     links_line.one_in = one_in;
     for (int i = 0; i < reads; i++)
         links_read(session, &s->policy, i, clk, &t);
@@ -142,7 +174,8 @@ static inline struct links_tally links_measure_bare_serial(const struct links_se
         if (!answer || checksum_take(&p->checksum, in, (size_t)(end - in), &size, NULL) < 0)
             t.refused++;
         else
-            links_believe(answer, command, links_tick(begun_ns), links_tick(clk_now_ns(clk)), &t);
+            links_believe(answer, &s->policy, i, links_tick(begun_ns), links_tick(clk_now_ns(clk)),
+                          &t);
         have -= (size_t)(end - in) + length;
         memmove(in, end + length, have);
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // An instrument in lines of text that says what links.h's quantity is at the moment it is asked, in
-// the words of the profiles sr830 and thorlabs-pm100; and whether what was read is true. Frames its
-// lines as its profile says: terminators, echo, checksum.
+// the words of the profiles sr830, keithley-6485 and thorlabs-pm100; and whether what was read is
+// true. Frames its lines as its profile says: terminators, echo, checksum.
 #pragma once
 #include "drivers/checksum.h"
 #include "drivers/session.h"
@@ -19,13 +19,16 @@ struct links_device {
     char late[PORT_REPLY_MOST];
 };
 
-static inline bool links_answer(const char *command, int64_t tick, char *text, size_t size)
+static inline bool links_answer(const struct profile *p, const char *command, int64_t tick,
+                                char *text, size_t size)
 {
     const double x = links_x(tick), y = links_y(tick), f = links_frequency(tick);
+    const bool keithley = strcmp(p->name, "keithley-6485") == 0;
     if (strstr(command, "*IDN?"))
         snprintf(text, size, "%s",
-                 *command == '*' ? "Thorlabs,PM100D,P0012345,2.4.0"
-                                 : "Stanford_Research_Systems,SR830,s/n43480,ver1.07");
+                 keithley          ? "KEITHLEY INSTRUMENTS INC.,MODEL 6485,1012345,B03"
+                 : *command == '*' ? "Thorlabs,PM100D,P0012345,2.4.0"
+                                   : "Stanford_Research_Systems,SR830,s/n43480,ver1.07");
     else if (strcmp(command, "SENS?") == 0)
         snprintf(text, size, "26");
     else if (strcmp(command, "SNAP?1,9") == 0)
@@ -34,6 +37,8 @@ static inline bool links_answer(const char *command, int64_t tick, char *text, s
         snprintf(text, size, "%.7g,%.7g,%.7g", x, f, y);
     else if (strcmp(command, "SNAP?2,9") == 0)
         snprintf(text, size, "%.7g,%.7g", y, f);
+    else if (strcmp(command, "READ?") == 0 && keithley)
+        snprintf(text, size, "%.8EA,%.3f,0", x * 1e-3, (double)tick * 1e-3);
     else if (strcmp(command, "READ?") == 0)
         snprintf(text, size, "%.8E", x);
     else
@@ -65,7 +70,7 @@ static inline void links_hear(struct links_device *d, char *command, int64_t t_n
     char answer[128];
     size_t size;
     if (checksum_take(&d->profile->checksum, command, strlen(command), &size, NULL) == 0 &&
-        links_answer(command, links_tick(t_ns), answer, sizeof answer))
+        links_answer(d->profile, command, links_tick(t_ns), answer, sizeof answer))
         links_say(d, command, answer, t_ns);
 }
 
@@ -108,6 +113,9 @@ struct links_policy {
     const char *name;
     struct profile *profile;
     const char *asks[2], *commands[2]; // exchanges, and what they send
+    const char *signals[2];            // values: the first number of the answer
+    double scale;                      // of x as the instrument says it
+    const char *begin[3];              // exchanges asked before
 };
 
 // Whether the command's answer was true at one moment since begun.
@@ -138,9 +146,7 @@ static inline void links_read(struct session *s, const struct links_policy *p, i
         return;
     }
     t->answered++;
-    v[0] = session_number(s, strcmp(command, "READ?") == 0      ? "power_w"
-                             : strcmp(command, "SNAP?2,9") == 0 ? "y"
-                                                                : "x");
+    v[0] = session_number(s, p->signals[i % 2]) / p->scale;
     if (strcmp(command, "READ?") != 0)
         v[1] = session_number(s, "frequency_hz");
     if (strcmp(command, "SNAP?1,9,2") == 0)
@@ -152,16 +158,17 @@ static inline void links_read(struct session *s, const struct links_policy *p, i
 }
 
 // A line as somebody would read it who trusts the wire.
-static inline void links_believe(const char *text, const char *command, int64_t begun, int64_t now,
-                                 struct links_tally *t)
+static inline void links_believe(const char *text, const struct links_policy *p, int i,
+                                 int64_t begun, int64_t now, struct links_tally *t)
 {
     double v[3] = {0};
     if (sscanf(text, "%lf,%lf,%lf", &v[0], &v[1], &v[2]) < 1) {
         t->refused++;
         return;
     }
+    v[0] /= p->scale;
     t->answered++;
-    t->wrong += !links_is_true(command, v, begun, now);
+    t->wrong += !links_is_true(p->commands[i % 2], v, begun, now);
 }
 
 static inline struct profile *links_profile(const char *name)
@@ -174,11 +181,11 @@ static inline struct profile *links_profile(const char *name)
     return p;
 }
 
-static inline void links_begin_session(struct session *s, const char *const *asks)
+static inline void links_begin_session(struct session *s, const struct links_policy *p)
 {
     struct gon_error err = {0};
-    for (; *asks; asks++)
-        if (session_ask_one(s, *asks, &err) < 0) {
+    for (int i = 0; i < 3 && p->begin[i]; i++)
+        if (session_ask_one(s, p->begin[i], &err) < 0) {
             fprintf(stderr, "check_links: %s\n", err.text);
             exit(1);
         }

@@ -156,8 +156,13 @@ static inline struct transport *links_begin_usb(struct links_usb *u, const struc
 
 static inline struct links_policy links_meter(void)
 {
-    struct profile *p = links_profile("thorlabs-pm100");
-    return (struct links_policy){"usbtmc", p, {"read", "read"}, {"READ?", "READ?"}};
+    return (struct links_policy){.name = "usbtmc",
+                                 .profile = links_profile("thorlabs-pm100"),
+                                 .asks = {"read", "read"},
+                                 .commands = {"READ?", "READ?"},
+                                 .signals = {"power_w", "power_w"},
+                                 .scale = 1,
+                                 .begin = {"identity"}};
 }
 
 // The lock-in's questions, of two forms in turn.
@@ -166,8 +171,13 @@ static inline struct links_policy links_lockin(void)
     struct profile *p = links_profile("sr830");
     strcpy(p->framing.end_out, "\n");
     strcpy(p->framing.end_in, "\n");
-    return (struct links_policy){
-        "usbtmc, two forms", p, {"snap_wide", "snap"}, {"SNAP?1,9,2", "SNAP?1,9"}};
+    return (struct links_policy){.name = "usbtmc, two forms",
+                                 .profile = p,
+                                 .asks = {"snap_wide", "snap"},
+                                 .commands = {"SNAP?1,9,2", "SNAP?1,9"},
+                                 .signals = {"x", "x"},
+                                 .scale = 1,
+                                 .begin = {"sync", "range"}};
 }
 
 static inline struct links_tally links_measure_usb(const struct links_policy *p, int reads,
@@ -177,11 +187,9 @@ static inline struct links_tally links_measure_usb(const struct links_policy *p,
     struct links_tally t = {.reads = reads};
     struct session *session;
     struct clk *clk = &u.usb.clk.clk;
-    const bool meter = p->asks[0] == p->asks[1];
     if (session_on_transport(p->profile, links_begin_usb(&u, p->profile, seed), &session, NULL) < 0)
         exit(1);
-    links_begin_session(session, meter ? (const char *const[]){"identity", NULL}
-                                       : (const char *const[]){"sync", "range", NULL});
+    links_begin_session(session, p);
     for (int i = 0; i < reads; i++) {
         links_arm(&u);
         links_read(session, p, i, clk, &t);
@@ -223,7 +231,7 @@ static inline struct links_tally links_measure_bare_usb(const struct links_polic
         }
         const size_t said = links_size(in), room = SIM_USB_PACKET - USBTMC_HEADER;
         in[USBTMC_HEADER + (said < room ? said : room)] = 0;
-        links_believe((const char *)in + USBTMC_HEADER, command, links_tick(begun_ns),
+        links_believe((const char *)in + USBTMC_HEADER, p, i, links_tick(begun_ns),
                       links_tick(clk_now_ns(clk)), &t);
     }
     t.faults = u.faults;

@@ -33,6 +33,7 @@ struct noisy {
     const char *garbage_lacks, *changed_lacks; // bytes that never come of it; NULL: none
     int64_t late_most_ns;                      // of a late answer, from when it was due
     int64_t double_most_ns;
+    int64_t soon_ns; // half of the delays are at most this; 0: only chance makes them short
     uint64_t faults;
     int lose_nth;                  // this answer from now gets lost; 0: none
     uint8_t last[PORT_REPLY_MOST]; // answer
@@ -82,6 +83,8 @@ static inline void noisy_merge(struct noisy *n, const uint8_t *bytes, size_t siz
 
 static inline int64_t noisy_delay(struct noisy *n, int64_t most_ns)
 {
+    if (n->soon_ns > 0 && noisy_roll(n, 2) == 0)
+        most_ns = n->soon_ns;
     return (int64_t)((double)noisy_roll(n, 1000000) * 1e-6 * (double)most_ns);
 }
 
