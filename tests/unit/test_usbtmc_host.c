@@ -263,6 +263,7 @@ static void each_fault_is_mended_and_the_next_value_is_right(void **state)
         {SIM_USB_WRONG_COMPLEMENT, 1, "the answer to another question (wrong tag)", 1, 1, 1},
         {SIM_USB_WRONG_ID, 1, "something that is no answer", 1, 1, 1},
         {SIM_USB_HUGE, 1, "an answer of an impossible size", 1, 1, 1},
+        {SIM_USB_LARGE, 1, "the answer breaks off", 1, 1, 1},
         {SIM_USB_SMALL, 1, "an answer of an impossible size", 1, 1, 1},
         {SIM_USB_SHORT, 1, NULL, 0, 0, 0},
         {SIM_USB_SPLIT, 1, NULL, 0, 0, 0},
