@@ -20,6 +20,7 @@ struct message {
     const struct message_format *format;
     bool out_of_step;
     bool stray;       // a command's answer may still come that nobody wants
+    bool ends;        // where the device says what a message is: it also sends the terminator
     int64_t ready_ns; // the next command not before
     size_t have;
     char in[LINE_MOST];
@@ -181,6 +182,9 @@ static int take_line(struct message *m, const char *command, size_t from, int64_
         m->have += (size_t)rc;
     }
     m->ready_ns = clk_now_ns(transport_clk(m->t)) + m->format->min_gap_ns;
+    if (transport_framed(m->t) && end == m->in + m->have && m->ends)
+        return garbled(m, command, "the answer breaks off", m->have, err);
+    m->ends = transport_framed(m->t) && end < m->in + m->have;
     *ret_line = (struct span){from, (size_t)(end - m->in)};
     return 0;
 }
@@ -387,6 +391,7 @@ int message_reopen(struct message *m, struct gon_error *err)
         return rc;
     m->ready_ns = clk_now_ns(transport_clk(m->t));
     m->out_of_step = true;
+    m->ends = false;
     return 0;
 }
 

@@ -2,7 +2,8 @@
 // Question and answer in lines of text over a transport: terminators, echo, a line that says OK,
 // checksums, minimum gap between commands, reassembly of partial lines, a cap on their length
 // (4 KiB), and resynchronisation. Over USB an answer ends where the device says so, with its
-// terminator or without.
+// terminator or without; from one that has sent its terminator, an answer without it is a part of
+// one.
 //
 // After any timeout or unreadable answer the link is out of step: a late answer would be taken for
 // the next one's. So the next query first drains until quiet_ns of silence and asks a question

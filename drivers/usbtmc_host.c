@@ -6,6 +6,7 @@
 #define PENDING_NS CLK_S(1) // for an abort or a clear to be done
 #define POLL_NS CLK_MS(50)
 #define CONTROL_NS CLK_MS(500) // for one control request
+#define STATUS_TRIES 3
 
 void usbtmc_host_init(struct usbtmc_host *h, struct usb_io *io, struct clk *clk, const char *name)
 {
@@ -122,7 +123,7 @@ static int clear_device(struct usbtmc_host *h, int64_t deadline_ns)
     if (rc >= 0)
         rc = clear_halt(h, h->shape.bulk_out);
     if (rc >= 0) {
-        h->asked = h->begun = h->halfway = h->unread = h->broken = false;
+        h->asked = h->begun = h->halfway = h->broken = false;
         h->at = h->have = 0;
     }
     return rc < 0 ? rc : 0;
@@ -134,7 +135,7 @@ static int reset(struct usbtmc_host *h, struct gon_error *err)
     const int rc = h->io->ops->reset(h->io);
     if (is_final(rc))
         return say(h, rc, "resetting", err);
-    h->asked = h->begun = h->halfway = h->unread = false;
+    h->asked = h->begun = h->halfway = false;
     h->broken = rc < 0;
     h->at = h->have = 0;
     return gon_fail(err, GON_E_DEVICE,
@@ -213,7 +214,6 @@ int usbtmc_host_write(struct usbtmc_host *h, const uint8_t *data, size_t size, i
                                               done + part == size);
         rc = put(h, frame, deadline_ns, "sending a command", err);
         done += part;
-        h->unread = true;
     }
     return rc;
 }
@@ -238,6 +238,23 @@ static size_t wanted(const struct usbtmc_host *h)
     return h->begun ? (h->left + packet - 1) / packet * packet : packet;
 }
 
+// Behind the payload there is room for padding. More than that, unless it is zeros, is payload that
+// the header does not tell of: what it does tell of is then only a part of the answer.
+static bool carries_more(const struct usbtmc_host *h, const uint8_t *rest, size_t size)
+{
+    for (size_t i = h->pad; i < size; i++)
+        if (rest[i])
+            return true;
+    return false;
+}
+
+static int wrong_answer(struct usbtmc_host *h, enum usbtmc_verdict v, struct gon_error *err)
+{
+    h->broken = true;
+    h->at = h->have = 0;
+    return gon_fail(err, GON_E_LINK, "%s: sent %s", h->name, usbtmc_verdict_text(v));
+}
+
 // One read from the endpoint into the buffer.
 static int receive(struct usbtmc_host *h, int64_t deadline_ns, struct gon_error *err)
 {
@@ -252,17 +269,18 @@ static int receive(struct usbtmc_host *h, int64_t deadline_ns, struct gon_error 
     size_t n = (size_t)rc, skip = 0;
     if (!h->begun && n > 0) { // a packet of zero bytes ended the transfer before
         const enum usbtmc_verdict v = usbtmc_parse_in(h->buffer, n, h->tag, USBTMC_CHUNK, &in);
-        if (v != USBTMC_GOOD) {
-            h->broken = true;
-            return gon_fail(err, GON_E_LINK, "%s: sent %s", h->name, usbtmc_verdict_text(v));
-        }
+        if (v != USBTMC_GOOD)
+            return wrong_answer(h, v, err);
         h->begun = true;
         h->left = in.size;
+        h->pad = (4 - in.size % 4) % 4;
         h->end = in.end;
         skip = USBTMC_HEADER;
     }
     h->at = skip;
     h->have = n - skip < h->left ? n : skip + h->left; // the rest is padding
+    if (carries_more(h, h->buffer + h->have, n - h->have))
+        return wrong_answer(h, USBTMC_WRONG_SIZE, err);
     h->left -= (uint32_t)(h->have - h->at);
     if (h->begun && h->left == 0)
         h->asked = h->begun = false;
@@ -290,7 +308,6 @@ int usbtmc_host_read(struct usbtmc_host *h, uint8_t *data, size_t size, int64_t 
     memcpy(data, h->buffer + h->at, n);
     h->at += n;
     h->ended = h->at == h->have && !h->asked && h->end;
-    h->unread = false;
     return (int)n;
 }
 
@@ -300,17 +317,23 @@ static int drop_unread(struct usbtmc_host *h, int64_t deadline_ns, struct gon_er
     uint8_t answer[USBTMC_STATUS_MOST], waste[256];
     int dropped = 0;
     h->status_tag = h->status_tag < 2 || h->status_tag == 127 ? 2 : h->status_tag + 1;
+    h->status_failed++;
     int rc =
         request(h, USBTMC_READ_STATUS_BYTE, h->status_tag, h->shape.interface, answer, deadline_ns);
     if (is_final(rc))
         return say(h, rc, "reading its status", err);
-    if (rc < 3 || answer[0] != USBTMC_SUCCESS || !(answer[2] & USBTMC_MESSAGE_AVAILABLE))
+    if (rc < 3 || answer[0] != USBTMC_SUCCESS)
         return 0;
-    do {
-        rc = usbtmc_host_read(h, waste, sizeof waste, deadline_ns, err);
-        dropped += rc > 0 ? rc : 0;
-    } while (rc >= 0 && !h->ended);
-    return rc < 0 ? rc : dropped;
+    if (answer[2] & USBTMC_MESSAGE_AVAILABLE) {
+        do {
+            rc = usbtmc_host_read(h, waste, sizeof waste, deadline_ns, err);
+            dropped += rc > 0 ? rc : 0;
+        } while (rc >= 0 && !h->ended);
+        if (rc < 0)
+            return rc;
+    }
+    h->status_failed = 0;
+    return dropped;
 }
 
 int usbtmc_host_drain(struct usbtmc_host *h, bool clear, int64_t deadline_ns, struct gon_error *err)
@@ -318,9 +341,7 @@ int usbtmc_host_drain(struct usbtmc_host *h, bool clear, int64_t deadline_ns, st
     int dropped = (int)(h->have - h->at);
     h->at = h->have = 0;
     int rc = mend(h, clear, deadline_ns, err);
-    if (rc == 0 && h->unread && h->can.usb488) {
-        h->unread = false;
+    if (rc == 0 && !clear && h->can.usb488 && h->status_failed < STATUS_TRIES)
         rc = drop_unread(h, deadline_ns, err);
-    }
     return rc < 0 ? rc : dropped + rc;
 }

@@ -6,7 +6,7 @@
 //   no answer in time      reading on waits for the same answer; the next command aborts it first
 //                          (INITIATE_ABORT_BULK_IN, CHECK until it is done), then INITIATE_CLEAR
 //                          and CHECK_CLEAR, which empty the device: the answer may come yet
-//   wrong tag, id or size  the same
+//   wrong tag, id or size  the same; also when more comes than the header says, and it is not zeros
 //   a command half taken   INITIATE_ABORT_BULK_OUT, CHECK, clear halt
 //   stall                  the halt is cleared at once, then INITIATE_CLEAR, CHECK_CLEAR
 //   CHECK_CLEAR pending    asked every 50 ms for 1 s, then the device is reset by its port
@@ -25,15 +25,16 @@ struct usbtmc_host {
     struct usb_shape shape;
     struct usbtmc_capabilities can;
     uint8_t tag, status_tag;
+    int status_failed; // times in a row
     // bulk-in
     bool asked;    // a request is out, its transfer not whole
     bool begun;    // its header was read
     bool end;      // and says that the message ends with it
     uint32_t left; // payload of it that is still to come
+    uint8_t pad;   // bytes that may follow the payload: to a multiple of 4
     bool ended;    // what was read last ended the message
     // bulk-out
     bool halfway; // a transfer broke off
-    bool unread;  // something was sent after which nothing was read
     bool broken;  // nothing goes before INITIATE_CLEAR
     uint64_t aborts, clears, halts, resets;
     size_t at, have; // payload in buffer that was not taken yet
@@ -55,6 +56,8 @@ int usbtmc_host_write(struct usbtmc_host *h, const uint8_t *data, size_t size, i
 int usbtmc_host_read(struct usbtmc_host *h, uint8_t *data, size_t size, int64_t deadline_ns,
                      struct gon_error *err);
 // Mends what went wrong; with clear it empties the device whatever went before. Without, an answer
-// that nobody read is thrown away if the status byte tells of one. Returns the bytes dropped.
+// that nobody read is thrown away if the status byte tells of one (USB488). A device that three
+// times in a row does not say its status, or tells of an answer that does not come, is not asked
+// again. Returns the bytes dropped.
 int usbtmc_host_drain(struct usbtmc_host *h, bool clear, int64_t deadline_ns,
                       struct gon_error *err);

@@ -7,8 +7,8 @@ enum { MSG_OUT = 1, REQUEST_IN = 2, HEADER = 12 };
 enum { SUCCESS = 0x01, PENDING = 0x02, FAILED = 0x80, NOT_IN_PROGRESS = 0x81 };
 
 static const char *const fault_names[SIM_USB_FAULTS] = {
-    "stall_in", "stall_out", "wrong_tag",   "wrong_complement", "wrong_id", "huge", "short",
-    "split",    "empty_end", "zero_packet", "pending",          "stale",    "deaf"};
+    "stall_in", "stall_out", "wrong_tag", "wrong_complement", "wrong_id", "huge",  "small", "large",
+    "short",    "split",     "empty_end", "zero_packet",      "pending",  "stale", "deaf"};
 
 bool sim_usbtmc_set_fault(struct sim_usbtmc *u, const char *name, unsigned count)
 {
@@ -90,6 +90,12 @@ static size_t first_message(const struct sim_usbtmc *u)
     return end ? (size_t)(end - u->answers) + length : 0;
 }
 
+static void put_size(uint8_t *header, size_t size)
+{
+    for (int i = 0; i < 4; i++)
+        header[4 + i] = (uint8_t)(size >> (8 * i));
+}
+
 static void corrupt(struct sim_usbtmc *u, size_t payload)
 {
     uint8_t *b = u->transfer;
@@ -103,6 +109,10 @@ static void corrupt(struct sim_usbtmc *u, size_t payload)
         b[0] = MSG_OUT + 126;
     if (strikes(u, SIM_USB_HUGE))
         memset(b + 4, 0xff, 4);
+    if (payload > 1 && strikes(u, SIM_USB_SMALL))
+        put_size(b, payload / 2);
+    if (payload > 1 && strikes(u, SIM_USB_LARGE))
+        put_size(b, 2 * payload);
     if (payload > 1 && strikes(u, SIM_USB_SHORT))
         u->pause = HEADER + 1;
 }
@@ -113,8 +123,7 @@ static void put_transfer(struct sim_usbtmc *u, size_t payload, bool end)
     u->transfer[0] = REQUEST_IN;
     u->transfer[1] = u->in_tag;
     u->transfer[2] = (uint8_t)(255 - u->in_tag);
-    for (int i = 0; i < 4; i++)
-        u->transfer[4 + i] = (uint8_t)(payload >> (8 * i));
+    put_size(u->transfer, payload);
     u->transfer[8] = end;
     memcpy(u->transfer + HEADER, u->answers, payload);
     u->answers_have -= payload;

@@ -22,6 +22,8 @@ enum sim_usb_fault {
     SIM_USB_WRONG_COMPLEMENT,
     SIM_USB_WRONG_ID,
     SIM_USB_HUGE,        // promises 4 GB
+    SIM_USB_SMALL,       // says half of what it sends
+    SIM_USB_LARGE,       // says twice as much
     SIM_USB_SHORT,       // a short packet in the middle of the transfer
     SIM_USB_SPLIT,       // half of the message, without EOM
     SIM_USB_EMPTY_END,   // all of the message without EOM, which then comes alone

@@ -145,6 +145,7 @@ def crc32c(data):
     ("wrong_tag", "the answer to another question (wrong tag)", 1),
     ("wrong_complement", "the answer to another question (wrong tag)", 1),
     ("huge", "an answer of an impossible size", 1),
+    ("small", "an answer of an impossible size", 1),
     ("deaf", "no answer in 500 ms", 1),
 ])
 def test_a_fault_is_reported_and_mended(usb, meter, fault, said, aborts):

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A bad cable between a driver and a simulated port: answers get lost, late, doubled, cut, split,
 // wrapped in garbage or changed, at random and repeatably. Replies of one frame stay whole in the
-// port behind it.
+// port behind it. No answer overtakes an earlier one: a double that comes late holds up the line.
 #pragma once
 #include "sim/port.h"
 
@@ -16,19 +16,28 @@ enum noisy_fault {
     NOISY_BEFORE,
     NOISY_AFTER,
     NOISY_CHANGED,
-    NOISY_FAULTS
+    NOISY_FAULTS,
+    // only where they are asked for (all)
+    NOISY_MERGED = NOISY_FAULTS, // behind the last answer once more, in one frame
+    NOISY_HEADLESS,              // begins too late
+    NOISY_ALL
 };
 
 struct noisy {
     struct port port; // first
     struct port *inner;
     uint64_t dice;
-    unsigned one_in;       // answers per fault; 0: none
-    unsigned only;         // bits of noisy_fault; 0: all kinds
-    int64_t late_most_ns;  // of a late answer, from when it was due
+    unsigned one_in;                           // answers per fault; 0: none
+    bool all;                                  // also the kinds from NOISY_FAULTS on
+    unsigned only;                             // bits of noisy_fault; 0: all kinds
+    const char *garbage_lacks, *changed_lacks; // bytes that never come of it; NULL: none
+    int64_t late_most_ns;                      // of a late answer, from when it was due
     int64_t double_most_ns;
+    int64_t soon_ns; // half of the delays are at most this; 0: only chance makes them short
     uint64_t faults;
-    int lose_nth;          // this answer from now gets lost; 0: none
+    int lose_nth;                  // this answer from now gets lost; 0: none
+    uint8_t last[PORT_REPLY_MOST]; // answer
+    size_t last_size;
 };
 
 static inline unsigned noisy_roll(struct noisy *n, unsigned sides)
@@ -39,30 +48,56 @@ static inline unsigned noisy_roll(struct noisy *n, unsigned sides)
     return (unsigned)(n->dice >> 33) % sides;
 }
 
+static inline bool noisy_lacks(const char *lacks, uint8_t byte)
+{
+    return !lacks || !byte || !strchr(lacks, byte);
+}
+
 static inline void noisy_garbage(struct noisy *n, int64_t due_ns)
 {
     uint8_t bytes[7];
     size_t size = 1 + noisy_roll(n, sizeof bytes);
     for (size_t i = 0; i < size; i++)
-        bytes[i] = (uint8_t)noisy_roll(n, 256);
+        do
+            bytes[i] = (uint8_t)noisy_roll(n, 256);
+        while (!noisy_lacks(n->garbage_lacks, bytes[i]));
     port_send(&n->port, bytes, size, due_ns);
 }
 
-static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int64_t due_ns)
+static inline void noisy_change(struct noisy *n, uint8_t *byte)
 {
-    unsigned fault =
-        n->one_in && noisy_roll(n, n->one_in) == 0 ? noisy_roll(n, NOISY_FAULTS) : NOISY_FAULTS;
-    if (n->only && !(n->only >> fault & 1))
-        fault = NOISY_FAULTS;
-    if (n->lose_nth > 0 && --n->lose_nth == 0)
-        return;
-    n->faults += fault < NOISY_FAULTS;
+    const uint8_t was = *byte;
+    do
+        *byte = was ^ (uint8_t)(1 + noisy_roll(n, 255));
+    while (!noisy_lacks(n->changed_lacks, *byte));
+}
+
+static inline void noisy_merge(struct noisy *n, const uint8_t *bytes, size_t size, int64_t due_ns)
+{
+    uint8_t both[PORT_REPLY_MOST];
+    const size_t room = sizeof both - size, before = n->last_size < room ? n->last_size : room;
+    memcpy(both, n->last, before);
+    memcpy(both + before, bytes, size);
+    port_send(&n->port, both, before + size, due_ns);
+}
+
+static inline int64_t noisy_delay(struct noisy *n, int64_t most_ns)
+{
+    if (n->soon_ns > 0 && noisy_roll(n, 2) == 0)
+        most_ns = n->soon_ns;
+    return (int64_t)((double)noisy_roll(n, 1000000) * 1e-6 * (double)most_ns);
+}
+
+static inline void noisy_strike(struct noisy *n, unsigned fault, uint8_t *bytes, size_t size,
+                                int64_t due_ns)
+{
+    size_t at;
     switch (fault) {
     case NOISY_LOST: return;
-    case NOISY_LATE: due_ns += (int64_t)noisy_roll(n, 1000) * (n->late_most_ns / 1000); break;
+    case NOISY_LATE: due_ns += noisy_delay(n, n->late_most_ns); break;
     case NOISY_DOUBLED:
         port_send(&n->port, bytes, size, due_ns);
-        due_ns += (int64_t)noisy_roll(n, 1000) * (n->double_most_ns / 1000);
+        due_ns += noisy_delay(n, n->double_most_ns);
         break;
     case NOISY_CUT: size = noisy_roll(n, (unsigned)size); break;
     case NOISY_SPLIT:
@@ -77,13 +112,34 @@ static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int6
         port_send(&n->port, bytes, size, due_ns);
         noisy_garbage(n, due_ns);
         return;
-    case NOISY_CHANGED:
-        bytes[noisy_roll(n, (unsigned)size)] ^= (uint8_t)(1 + noisy_roll(n, 255));
+    case NOISY_CHANGED: noisy_change(n, &bytes[noisy_roll(n, (unsigned)size)]); break;
+    case NOISY_MERGED: noisy_merge(n, bytes, size, due_ns); return;
+    case NOISY_HEADLESS:
+        at = noisy_roll(n, (unsigned)size);
+        bytes += at;
+        size -= at;
         break;
     default: break;
     }
     if (size > 0)
         port_send(&n->port, bytes, size, due_ns);
+}
+
+static inline void noisy_pass(struct noisy *n, uint8_t *bytes, size_t size, int64_t due_ns)
+{
+    uint8_t kept[PORT_REPLY_MOST];
+    memcpy(kept, bytes, size);
+    unsigned fault = NOISY_ALL;
+    if (n->one_in && noisy_roll(n, n->one_in) == 0)
+        fault = noisy_roll(n, n->all ? NOISY_ALL : NOISY_FAULTS);
+    if (n->only && !(n->only >> fault & 1))
+        fault = NOISY_ALL;
+    if (n->lose_nth > 0 && --n->lose_nth == 0)
+        return;
+    n->faults += fault < NOISY_ALL;
+    noisy_strike(n, fault, bytes, size, due_ns);
+    memcpy(n->last, kept, size);
+    n->last_size = size;
 }
 
 static inline void noisy_feed(struct port *p, const uint8_t *bytes, size_t size, int64_t t_ns)

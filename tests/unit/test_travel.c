@@ -436,6 +436,28 @@ static void an_axis_that_stands_while_it_moves_is_blocked(void **state)
     assert_true(s->b.clk.t_ns - s->cancel_at_ns < CLK_S(2));
 }
 
+static void shove_theta_r(void *ctx, int64_t t_ns)
+{
+    struct setting *s = ctx;
+    if (t_ns > s->cancel_at_ns) {
+        motion_go(&s->b.world.axis[WORLD_THETA_R], 25, 20, 60, 60, t_ns);
+        s->b.clk.on_advance = NULL;
+    }
+}
+
+static void an_axis_that_moves_without_a_command_is_reported(void **state)
+{
+    struct setting *s = *state;
+    struct travel_pose at;
+    struct gon_error err;
+    assert_int_equal(move(s, 0, 20, 0, &at, NULL), 0);
+    s->cancel_at_ns = s->b.clk.t_ns + CLK_MS(500);
+    s->b.clk.on_advance = shove_theta_r;
+    s->b.clk.ctx = s;
+    assert_int_equal(move(s, 80, 20, 0, &at, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "axis theta_r: moved by itself from 20.0000 to 2"));
+}
+
 static void an_axis_that_lags_is_stopped_when_a_limit_is_set(void **state)
 {
     struct setting *s = *state;
@@ -485,6 +507,7 @@ int main(void)
         T(no_move_enters_a_keep_out),
         T(from_above_is_the_same_the_other_way_round),
         T(an_axis_that_stands_while_it_moves_is_blocked),
+        T(an_axis_that_moves_without_a_command_is_reported),
         T(an_axis_that_lags_is_stopped_when_a_limit_is_set),
         T(retries_are_the_axiss_own),
     };

@@ -158,6 +158,66 @@ static void an_answer_ends_at_eom_without_its_terminator(void **state)
     end(&b);
 }
 
+static void where_terminators_come_an_answer_without_one_is_a_part(void **state)
+{
+    struct bench b;
+    struct gon_error err;
+    char answer[80];
+    (void)state;
+    begin(&b, NULL);
+    check_next_value(&b);
+    b.usb.device.end = "0"; // "Thorlabs,PM10"
+    assert_int_equal(message_query(b.m, "*IDN?", answer, sizeof answer, &err), GON_E_LINK);
+    assert_non_null(strstr(err.text, "the answer breaks off: 'Thorlabs,PM10'"));
+    b.usb.device.end = "\n";
+    check_next_value(&b);
+    end(&b);
+}
+
+static void an_answer_given_twice_is_dropped(void **state)
+{
+    struct bench b;
+    (void)state;
+    begin(&b, NULL);
+    for (int i = 0; i < 10; i++) {
+        char again[40];
+        check_next_value(&b);
+        snprintf(again, sizeof again, "%.9E\n", meter_value_w(b.meter.measured));
+        port_send(&b.meter.port, again, strlen(again), b.usb.clk.t_ns);
+    }
+    check_next_value(&b);
+    assert_int_equal(message_stats(b.m)->errors[LINK_STRAY], 10);
+    assert_int_equal(b.usb.device.requests[CLEAR], 1);
+    end(&b);
+}
+
+// Always tells of an answer that nobody read.
+static int lying_control(struct usb_io *io, const struct usbtmc_setup *s, uint8_t *data,
+                         int64_t deadline_ns)
+{
+    const int rc = vusb_control(io, s, data, deadline_ns);
+    if (s->request == STATUS)
+        data[2] |= USBTMC_MESSAGE_AVAILABLE;
+    return rc;
+}
+
+static void a_status_that_lies_is_not_asked_for_ever(void **state)
+{
+    struct bench b;
+    struct usb_io_ops ops;
+    (void)state;
+    begin(&b, NULL);
+    ops = *b.usb.io.ops;
+    ops.control = lying_control;
+    b.usb.io.ops = &ops;
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(message_query(b.m, "MEAS:POW?", (char[80]){0}, 80, NULL), GON_E_LINK);
+    for (int i = 0; i < 10; i++)
+        check_next_value(&b);
+    assert_int_equal(b.usb.device.requests[STATUS], 3);
+    end(&b);
+}
+
 static void a_long_command_goes_in_parts(void **state)
 {
     struct bench b;
@@ -203,6 +263,8 @@ static void each_fault_is_mended_and_the_next_value_is_right(void **state)
         {SIM_USB_WRONG_COMPLEMENT, 1, "the answer to another question (wrong tag)", 1, 1, 1},
         {SIM_USB_WRONG_ID, 1, "something that is no answer", 1, 1, 1},
         {SIM_USB_HUGE, 1, "an answer of an impossible size", 1, 1, 1},
+        {SIM_USB_LARGE, 1, "the answer breaks off", 1, 1, 1},
+        {SIM_USB_SMALL, 1, "an answer of an impossible size", 1, 1, 1},
         {SIM_USB_SHORT, 1, NULL, 0, 0, 0},
         {SIM_USB_SPLIT, 1, NULL, 0, 0, 0},
         {SIM_USB_EMPTY_END, 1, NULL, 0, 0, 0},
@@ -497,6 +559,9 @@ int main(void)
         cmocka_unit_test(a_query_is_answered),
         cmocka_unit_test(answers_of_any_length_come_whole),
         cmocka_unit_test(an_answer_ends_at_eom_without_its_terminator),
+        cmocka_unit_test(where_terminators_come_an_answer_without_one_is_a_part),
+        cmocka_unit_test(an_answer_given_twice_is_dropped),
+        cmocka_unit_test(a_status_that_lies_is_not_asked_for_ever),
         cmocka_unit_test(a_long_command_goes_in_parts),
         cmocka_unit_test(an_answer_that_nobody_read_is_dropped),
         cmocka_unit_test(each_fault_is_mended_and_the_next_value_is_right),

@@ -29,6 +29,7 @@ struct vline {
     dev_t device;
     bool tcp;
     ino_t socket; // of the connection
+    int fd;       // known to be the line until it is closed; 0: none
     struct port *port;
     struct clk_virtual clk;
     char link[96]; // "serial:/dev/pts/N"
@@ -50,10 +51,15 @@ static struct vline vline;
 static inline bool vline_is(int fd)
 {
     struct stat s;
+    if (vline.port && vline.fd > 0 && fd == vline.fd)
+        return true;
     if (!vline.port || fstat(fd, &s) != 0)
         return false;
-    return vline.tcp ? S_ISSOCK(s.st_mode) && s.st_ino == vline.socket
-                     : S_ISCHR(s.st_mode) && s.st_rdev == vline.device;
+    const bool is = vline.tcp ? S_ISSOCK(s.st_mode) && s.st_ino == vline.socket
+                              : S_ISCHR(s.st_mode) && s.st_rdev == vline.device;
+    if (is)
+        vline.fd = fd;
+    return is;
 }
 
 static inline bool vline_hung_up(void)
@@ -188,6 +194,13 @@ ssize_t write(int fd, const void *from, size_t size)
         size = vline.write_most;
     port_feed(vline.port, from, size, vline.clk.t_ns);
     return (ssize_t)size;
+}
+
+int close(int fd)
+{
+    if (fd == vline.fd)
+        vline.fd = 0;
+    return VLINE_REAL(close)(fd);
 }
 
 ssize_t recv(int fd, void *to, size_t size, int flags)
