@@ -437,6 +437,7 @@ int storer_start(const struct storer_links *links, struct storer **ret_storer,
         storer_free(s);
         return gon_fail(err, GON_E_SYSTEM, "store thread: %s", strerror(failed));
     }
+    (void)pthread_setname_np(s->thread, "store"); // for top -H and debuggers
     *ret_storer = s;
     return GON_OK;
 }
