@@ -4,6 +4,7 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/log.h"
+#include "campaign/state.h"
 #include "daemon/api.h"
 #include "daemon/fitter.h"
 #include "daemon/loop.h"
@@ -17,7 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EVENTS = 4096, MOST_EVENT_BYTES = 4 * 1024 * 1024, MOST_STOPS = 32 };
+enum { MOST_EVENTS = 4096, MOST_EVENT_BYTES = 4 * 1024 * 1024, MOST_STOPS = 32, MOST_KEPT = 1000 };
 
 struct hub {
     struct hub_options options;
@@ -193,6 +194,27 @@ static void cancel_port(void *ctx)
     cancel_request(h->cancel);
 }
 
+static void keep_port(void *ctx)
+{
+    struct hub *h = ctx;
+    struct queue_entry entries[MOST_KEPT];
+    const size_t count = queue_entries(h->queue, entries, MOST_KEPT);
+    struct note *n = note_new(NOTE_QUEUE);
+    struct state_queue *kept = state_queue_new(count);
+    for (size_t i = 0; kept && i < count; i++) {
+        struct state_entry *e = &kept->entries[i];
+        *e = (struct state_entry){
+            .run = entries[i].run->id, .held = entries[i].run->held, .active = entries[i].active};
+        snprintf(e->path, sizeof e->path, "%s", entries[i].run->path);
+    }
+    n->thing = kept;
+    if (kept)
+        note_post(h->store_box, n);
+    else
+        note_free(n);
+    publish(h, "queue", view_queue(h->queue));
+}
+
 static void rearm_port(void *ctx)
 {
     struct hub *h = ctx;
@@ -212,6 +234,7 @@ char *hub_submitted(const struct hub *h, int run, uint64_t event_id)
     const struct run *r = queue_run(h->queue, run);
     json_t *o = view_run(r, false);
     json_object_set_new(o, "event_id", json_integer((json_int_t)event_id));
+    json_object_set_new(o, "queue_held", json_boolean(queue_is_held(h->queue)));
     return view_text(o);
 }
 
@@ -259,6 +282,17 @@ static bool is_paused(const struct hub *h, int run)
     return active && active->id == run && active->state == RUN_PAUSED;
 }
 
+// A run that only waits because it, or the queue, is held goes on first of all.
+static bool release(struct hub *h, int id)
+{
+    const struct run *run = queue_run(h->queue, id);
+    if ((!run->held && !queue_is_held(h->queue)) || queue_move(h->queue, id, 1, NULL) < 0)
+        return false;
+    queue_hold(h->queue, id, false, NULL);
+    queue_hold(h->queue, 0, false, NULL);
+    return true;
+}
+
 int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err)
 {
     const struct run *known = queue_run(h->queue, run);
@@ -266,6 +300,8 @@ int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err)
         int rc = hub_resume(h, err);
         return rc < 0 ? rc : 1;
     }
+    if (known && release(h, run))
+        return 1;
     int rc = known ? queue_may_submit(h->queue, run, err) : GON_OK;
     if (rc < 0)
         return rc;
@@ -328,7 +364,27 @@ int hub_pause(struct hub *h, struct gon_error *err)
 
 int hub_resume(struct hub *h, struct gon_error *err)
 {
+    struct queue_entry first;
+    if (queue_idle(h->queue) && queue_is_held(h->queue) && queue_entries(h->queue, &first, 1)) {
+        queue_hold(h->queue, 0, false, NULL);
+        return first.run->id;
+    }
     return to_active(h, NOTE_RESUME, 1u << RUN_PAUSED, err);
+}
+
+int hub_queue_remove(struct hub *h, int run, const char *by, struct gon_error *err)
+{
+    return queue_remove(h->queue, run, by, err);
+}
+
+int hub_queue_move(struct hub *h, int run, int place, struct gon_error *err)
+{
+    return queue_move(h->queue, run, place, err);
+}
+
+int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err)
+{
+    return queue_hold(h->queue, run, held, err);
 }
 
 // --- what the workers say ------------------------------------------------------------------------
@@ -378,6 +434,27 @@ static void halted(struct hub *h, const struct note *n)
     }
 }
 
+static void restored(struct hub *h, const struct note *n)
+{
+    const struct state_queue *earlier = n->thing;
+    for (size_t i = 0; earlier && i < earlier->count; i++)
+        queue_restore(h->queue, earlier->entries[i].run, earlier->entries[i].held);
+    if (queue_is_held(h->queue))
+        log_say(h->options.log, LOG_NOTICE, "queue",
+                "held, as goniod was started anew; look: gonio queue, go on: gonio queue release");
+}
+
+// Before the list is complete: it could not be read either, and the folder may be another's.
+static void unkept(struct hub *h, const struct note *n)
+{
+    log_say(h->options.log, LOG_ERR, "queue", "%s", n->err.text);
+    snprintf(h->last_error, sizeof h->last_error, "%s", n->err.text);
+    if (!h->listed && !h->ended_said) {
+        h->ended_said = true;
+        h->options.ended(h->options.ctx, &n->err);
+    }
+}
+
 static void take_snapshot(struct hub *h, struct note *n)
 {
     free(h->snapshot);
@@ -407,6 +484,8 @@ static void take(struct hub *h, struct note *n)
         if (n->err.code)
             log_say(h->options.log, LOG_WARN, "store", "%s", n->err.text);
         break;
+    case NOTE_RESTORED: restored(h, n); break;
+    case NOTE_UNKEPT: unkept(h, n); break;
     case NOTE_KNOWN: known(h, n); break;
     case NOTE_FOUND: found(h, n); break;
     case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
@@ -465,7 +544,7 @@ static int start_workers(struct hub *h, struct gon_error *err)
 static int build(struct hub *h, int listen_fd, struct gon_error *err)
 {
     struct queue_ports q = {h,          open_port,   start_port, fit_port,
-                            close_port, cancel_port, rearm_port, changed};
+                            close_port, cancel_port, rearm_port, changed, keep_port};
     struct http_ports p = {h, api_request};
     // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be
     // late.

@@ -14,6 +14,11 @@ json_t *view_number(double value); // null unless finite
 // with_fit adds "fit".
 json_t *view_run(const struct run *run, bool with_fit);
 
+// {"held", "left_s", "entries": [{"run", "name", "sample", "place", "active", "held", "left_s",
+// "ready_s"}]}: place 0 is the run that has the bench; ready_s: until it is done, by the estimates
+// and the order, null of one that is held or when it is not known.
+json_t *view_queue(const struct queue *q);
+
 // [{"name", "link", "address", "identity", "problem", "errors", "returns", then what belongs to
 // it}]; of an axis "unit", "position", "target" (user), "dial", "raw_steps", "moving", "homed",
 // "alarm", "alarm_code"
