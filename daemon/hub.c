@@ -28,6 +28,7 @@ struct hub {
     struct events *events;
     struct http *http;
     struct queue *queue;
+    struct control control;
     struct storer *storer;
     struct runner *runner;
     struct fitter *fitter;
@@ -371,6 +372,46 @@ int hub_resume(struct hub *h, struct gon_error *err)
     }
     return to_active(h, NOTE_RESUME, 1u << RUN_PAUSED, err);
 }
+
+// --- who commands --------------------------------------------------------------------------------
+
+const struct control *hub_control(const struct hub *h)
+{
+    return &h->control;
+}
+
+static int control_changed(struct hub *h, int rc, const char *what)
+{
+    if (rc < 0)
+        return rc;
+    log_say(h->options.log, LOG_NOTICE, "control", "%s", what);
+    publish(h, "control", json_pack("{s:o}", "control", view_control(&h->control)));
+    return rc;
+}
+
+int hub_control_take(struct hub *h, const char *name, const char *reason, const char *from,
+                     struct gon_error *err)
+{
+    char what[2 * CONTROL_NAME + CONTROL_REASON + 40];
+    const char *before = h->control.name;
+    snprintf(what, sizeof what, "%.64s takes control%s%s%s%.160s", name,
+             *before && strcmp(before, name) ? " from " : "",
+             *before && strcmp(before, name) ? before : "", reason && *reason ? ": " : "",
+             reason ? reason : "");
+    return control_changed(h,
+                           control_take(&h->control, name, reason, from,
+                                        clk_utc_ns(clk_system()) / 1000000, err),
+                           what);
+}
+
+int hub_control_release(struct hub *h, const char *name, struct gon_error *err)
+{
+    char what[CONTROL_NAME + 40];
+    snprintf(what, sizeof what, "%s releases control", name);
+    return control_changed(h, control_release(&h->control, name, err), what);
+}
+
+// --- the queue's order ---------------------------------------------------------------------------
 
 int hub_queue_remove(struct hub *h, int run, const char *by, struct gon_error *err)
 {

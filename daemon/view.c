@@ -64,6 +64,14 @@ json_t *view_queue(const struct queue *q)
                      "entries", all);
 }
 
+json_t *view_control(const struct control *c)
+{
+    if (!control_taken(c))
+        return json_null();
+    return json_pack("{s:s, s:s, s:I}", "name", c->name, "reason", c->reason, "since_utc_ms",
+                     (json_int_t)c->since_utc_ms);
+}
+
 json_t *view_flags(unsigned flags)
 {
     char text[200], *rest = text, *name;
