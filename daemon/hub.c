@@ -4,11 +4,13 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/log.h"
+#include "campaign/bench.h"
 #include "campaign/state.h"
 #include "daemon/api.h"
 #include "daemon/fitter.h"
 #include "daemon/loop.h"
 #include "daemon/material.h"
+#include "daemon/messenger.h"
 #include "daemon/note.h"
 #include "daemon/runner.h"
 #include "daemon/storer.h"
@@ -29,6 +31,8 @@ struct hub {
     struct http *http;
     struct queue *queue;
     struct control control;
+    struct messenger *messenger;           // NULL: nobody is told
+    const char *notify[BENCH_NOTIFY + 1];  // its command
     struct storer *storer;
     struct runner *runner;
     struct fitter *fitter;
@@ -84,6 +88,14 @@ static void keep_state(struct hub *h, const struct run *run)
     note_post(h->store_box, n);
 }
 
+static void tell(struct hub *h, const struct run *run)
+{
+    if (run->state != RUN_PAUSED && run->state != RUN_FAILED && run->state != RUN_DONE)
+        return;
+    const struct message m = {run->id, run_state_name(run->state), run->name, run->path, run->text};
+    messenger_tell(h->messenger, &m);
+}
+
 static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
@@ -97,6 +109,7 @@ static void changed(void *ctx, const struct run *run)
     else if (run->state == RUN_RUNNING || run->state == RUN_DONE)
         h->last_error[0] = 0; // it was overcome; the log and the file's events keep it
     publish(h, "state", view_run(run, false));
+    tell(h, run);
     if (run == queue_active(h->queue))
         keep_state(h, run);
     if (run == queue_active(h->queue) || queue_idle(h->queue))
@@ -582,6 +595,17 @@ static int start_workers(struct hub *h, struct gon_error *err)
     return rc < 0 ? rc : runner_start(&r, &h->runner, err);
 }
 
+static int start_messenger(struct hub *h, struct gon_error *err)
+{
+    const struct bench_config *bench = h->options.bench;
+    if (!bench->notify.argc)
+        return GON_OK;
+    for (int i = 0; i < bench->notify.argc; i++)
+        h->notify[i] = bench->notify.argv[i];
+    const struct messenger_command command = {h->notify, bench->notify.limit_s};
+    return messenger_new(h->loop, &command, h->options.log, &h->messenger, err);
+}
+
 static int build(struct hub *h, int listen_fd, struct gon_error *err)
 {
     struct queue_ports q = {h,          open_port,   start_port, fit_port,
@@ -601,6 +625,7 @@ static int build(struct hub *h, int listen_fd, struct gon_error *err)
         !h->queue)
         return gon_fail(err, GON_E_SYSTEM, "daemon: out of memory or descriptors");
     int rc = loop_add(h->loop, mail_fd(h->box), mail_arrived, h, err);
+    rc = rc < 0 ? rc : start_messenger(h, err);
     rc = rc < 0 ? rc : start_workers(h, err);
     if (rc < 0)
         return rc;
@@ -655,6 +680,7 @@ bool hub_free(struct hub *h)
     storer_join(h->storer);
     http_free(h->http);
     queue_free(h->queue);
+    messenger_free(h->messenger);
     events_free(h->events);
     if (h->box)
         loop_remove(h->loop, mail_fd(h->box));
