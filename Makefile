@@ -226,11 +226,15 @@ install: all doc
 	install -d $(DESTDIR)$(PREFIX)/share/gonio/profiles
 	install -m644 $(wildcard configs/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/configs
 	install -m644 $(wildcard configs/profiles/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/profiles
+	install -d $(DESTDIR)$(PREFIX)/lib/systemd/system $(DESTDIR)$(PREFIX)/lib/sysusers.d
+	sed 's,@PREFIX@,$(PREFIX),' configs/systemd/goniod.service >$(DESTDIR)$(PREFIX)/lib/systemd/system/goniod.service
+	install -m644 configs/systemd/gonio.sysusers $(DESTDIR)$(PREFIX)/lib/sysusers.d/gonio.conf
 	for page in $(notdir $(MAN)); do \
 	    install -D -m644 $(B)/man/$$page $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page || exit 1; done
 uninstall:
 	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(DESTDIR)$(PREFIX)/sbin/goniod
 	rm -rf $(DESTDIR)$(PREFIX)/share/gonio
+	rm -f $(DESTDIR)$(PREFIX)/lib/systemd/system/goniod.service $(DESTDIR)$(PREFIX)/lib/sysusers.d/gonio.conf
 	for page in $(notdir $(MAN)); do rm -f $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page; done
 clean:
 	rm -rf build

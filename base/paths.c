@@ -2,6 +2,7 @@
 #include "base/paths.h"
 
 #include <limits.h>
+#include <pwd.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,4 +59,11 @@ void paths_program(const char *name, char *ret_path, size_t size)
             return;
     }
     snprintf(ret_path, size, "%s", name);
+}
+
+void paths_person(char *ret_name, size_t size)
+{
+    const struct passwd *user = filled("GONIO_NAME") ? NULL : getpwuid(getuid());
+    snprintf(ret_name, size, "%s",
+             filled("GONIO_NAME") ? filled("GONIO_NAME") : user ? user->pw_name : "");
 }

@@ -16,3 +16,7 @@ int paths_socket_fits(const char *path, struct gon_error *err);
 // Another of gonio's programs: beside this one (as it was built), in ../bin (as installed), else its
 // name alone, for PATH to find.
 void paths_program(const char *name, char *ret_path, size_t size);
+
+// Who sits there, for the daemon and for colleagues: $GONIO_NAME, else the login name; "" without
+// either. At most size - 1 bytes.
+void paths_person(char *ret_name, size_t size);

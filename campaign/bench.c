@@ -178,6 +178,17 @@ static const struct cfg_row row_rows[] = {
 static const struct cfg_row daemon_rows[] = {
     TEXT(bench_config, "directory", directory, "",
          "Where campaign files go; goniod(8), FILES, says what goes before it and where otherwise."),
+    {.name = "notify",
+     .type = CFG_STRINGS,
+     .offset = offsetof(struct bench_config, notify.argv),
+     .size = BENCH_NOTIFY,
+     .stride = sizeof(((struct bench_config *)0)->notify.argv[0]),
+     .count_offset = offsetof(struct bench_config, notify.argc),
+     .fallback = "[ ]",
+     .help = "A program by its path and its arguments, started without a shell when a run is paused, "
+             "failed or done; the last argument is the sentence that says so."},
+    REAL(bench_config, "notify_limit_s", notify.limit_s, "s", 0.1, 600, "10",
+         "After this time that program is killed."),
     {0}};
 
 #define MANY(n, member, most, element, table, def, text)                                           \

@@ -18,7 +18,8 @@ enum {
     BENCH_VERTICES = 16,
     BENCH_NAME = 32,
     BENCH_LINK = 256,
-    BENCH_FOLDER = 256
+    BENCH_FOLDER = 256,
+    BENCH_NOTIFY = 12
 };
 
 enum bench_regime {
@@ -131,6 +132,11 @@ struct bench_config {
     struct bench_station stations[BENCH_STATIONS];
     int stations_count;
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides
+    struct {
+        char argv[BENCH_NOTIFY][256]; // a program and its arguments
+        int argc;                     // 0: nobody is told
+        double limit_s;
+    } notify;
 };
 
 extern const struct cfg_row bench_config_schema[];

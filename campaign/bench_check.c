@@ -298,6 +298,15 @@ static int check_links(struct cfg_file *f, const struct bench_config *b)
     return mistakes;
 }
 
+// Not by PATH: what is started must not depend on who started goniod.
+static int check_notify(struct cfg_file *f, const struct bench_config *b)
+{
+    if (!b->notify.argc || b->notify.argv[0][0] == '/')
+        return 0;
+    return cfg_complain(f, "daemon.notify", "'%s': allowed a program's full path, as /usr/bin/logger",
+                        b->notify.argv[0]);
+}
+
 int bench_check(struct cfg_file *f, const struct bench_config *b)
 {
     struct kinematics kinematics;
@@ -316,5 +325,6 @@ int bench_check(struct cfg_file *f, const struct bench_config *b)
     if (!bench_find_station(b, "beam"))
         mistakes += cfg_complain(
             f, "stations", "station 'beam' is missing: where the detector looks into the beam");
-    return mistakes + marks + outlines + maps + check_links(f, b) + bench_states_check(f, b);
+    return mistakes + marks + outlines + maps + check_links(f, b) + check_notify(f, b) +
+           bench_states_check(f, b);
 }

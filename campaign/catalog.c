@@ -7,6 +7,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <pwd.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -198,6 +199,21 @@ int catalog_read(const char *path, struct catalog_entry *ret_entry)
     }
     *ret_entry = e;
     return rc;
+}
+
+double catalog_left_s(const struct catalog_entry *e, const struct bench_config *bench)
+{
+    struct campaign_config config;
+    struct plan plan = {0};
+    struct store *s;
+    double left_s = (double)NAN;
+    if (store_open(e->path, STORE_READ, &s, NULL) < 0)
+        return left_s;
+    if (store_read_config(s, &config, NULL) == 0 && plan_make(&config, bench, &plan, NULL) == 0)
+        left_s = plan.duration_s * (plan.count - e->done) / plan.count;
+    plan_clear(&plan);
+    store_close(s, NULL);
+    return left_s;
 }
 
 struct list {

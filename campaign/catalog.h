@@ -36,6 +36,8 @@ int catalog_create(const char *directory, int above, const struct store_new *wha
 // empty. A file that cannot be read is listed with its problem.
 int catalog_list(const char *directory, struct catalog_entry **ret_entries, struct gon_error *err);
 int catalog_read(const char *path, struct catalog_entry *ret_entry); // never fails: see problem
+// How long the rest of it will take on a bench, estimated; NAN: not known.
+double catalog_left_s(const struct catalog_entry *e, const struct bench_config *bench);
 int catalog_id(const char *path); // of its name; 0 when it has none
 
 // FILE as a person types it: a path, a number, or a campaign's name (the newest of that name).

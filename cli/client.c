@@ -169,12 +169,26 @@ static int give_up(void *ctx, curl_off_t a, curl_off_t b, curl_off_t c_, curl_of
     return now_ns - c->interrupted_ns > GRACE_NS;
 }
 
+// Who asks, for the daemon's control.
+static struct curl_slist *add_name(struct client *c, struct curl_slist *headers)
+{
+    char name[65], line[300];
+    paths_person(name, sizeof name);
+    char *escaped = *name ? curl_easy_escape(c->curl, name, 0) : NULL;
+    if (!escaped)
+        return headers;
+    snprintf(line, sizeof line, "Gonio-Name: %s", escaped);
+    curl_free(escaped);
+    return curl_slist_append(headers, line);
+}
+
 int client_request(struct client *c, const char *method, const char *path, const json_t *body,
                    json_t **ret_reply, struct gon_error *err)
 {
     struct reply r = {0};
     char *text = body ? json_dumps(body, JSON_COMPACT) : strdup("");
-    struct curl_slist *headers = curl_slist_append(NULL, "Content-Type: application/json");
+    struct curl_slist *headers =
+        add_name(c, curl_slist_append(NULL, "Content-Type: application/json"));
     prepare(c, path);
     curl_easy_setopt(c->curl, CURLOPT_CUSTOMREQUEST, method);
     if (strcmp(method, "GET")) {

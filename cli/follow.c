@@ -52,15 +52,10 @@ static void clear_line(struct follow *f)
 
 static void time_left(double left_s, char *text, size_t size)
 {
-    if (!isfinite(left_s))
-        *text = 0;
-    else if (left_s < 100)
-        snprintf(text, size, "%.0f s left", left_s);
-    else if (left_s < 6000)
-        snprintf(text, size, "%.0f min left", left_s / 60);
-    else
-        snprintf(text, size, "%.0f h %02.0f min left", floor(left_s / 3600),
-                 floor(fmod(left_s, 3600) / 60));
+    char time[40] = "";
+    if (isfinite(left_s))
+        out_duration(time, sizeof time, left_s);
+    snprintf(text, size, "%s%s", time, *time ? " left" : "");
 }
 
 static void where(const json_t *e, char *text, size_t size)

@@ -75,6 +75,16 @@ void out_value(char *text, size_t size, double value, double u)
     snprintf(text, size, "%.*f ±%.*f", decimals, value, decimals, u);
 }
 
+void out_duration(char *text, size_t size, double s)
+{
+    if (s < 100)
+        snprintf(text, size, "%.0f s", s);
+    else if (s < 6000)
+        snprintf(text, size, "%.0f min", s / 60);
+    else
+        snprintf(text, size, "%.0f h %02.0f min", floor(s / 3600), floor(fmod(s, 3600) / 60));
+}
+
 int out_fail(const struct gon_error *err)
 {
     fprintf(stderr, "%sgonio:%s %s\n", out_begin(stderr, OUT_RED), out_end(stderr), err->text);

@@ -25,6 +25,9 @@ void out_warn(const char *fmt, ...)
 // "0.0317 ±0.0006": as many decimals as the first digit of u needs; without u, four digits.
 void out_value(char *text, size_t size, double value, double u);
 
+// A time to go by: "40 s", "12 min", "3 h 05 min"; finite.
+void out_duration(char *text, size_t size, double s);
+
 // Says the error and returns the exit status that its code stands for.
 int out_fail(const struct gon_error *err);
 

@@ -32,14 +32,11 @@ struct sweep {
 
 static void duration_text(double s, char *text, size_t size)
 {
-    if (!isfinite(s))
-        snprintf(text, size, "time unknown without --bench");
-    else if (s < 100)
-        snprintf(text, size, "about %.0f s", s);
-    else if (s < 6000)
-        snprintf(text, size, "about %.0f min", s / 60);
+    const size_t about = (size_t)snprintf(text, size, "about ");
+    if (isfinite(s))
+        out_duration(text + about, size - about, s);
     else
-        snprintf(text, size, "about %.0f h %02.0f min", floor(s / 3600), floor(fmod(s, 3600) / 60));
+        snprintf(text, size, "time unknown without --bench");
 }
 
 static struct sweep sweep_of(const struct plan *p, const struct campaign_config *c, int sweep)

@@ -156,6 +156,10 @@ static void print_status(const json_t *s)
         printf("idle      start a run: gonio run FILE.cfg\n");
     if (json_array_size(json_object_get(s, "queued")))
         printf("waiting   %zu more\n", json_array_size(json_object_get(s, "queued")));
+    if (json_is_object(json_object_get(s, "control")))
+        printf("control   %s\n", text_of(json_object_get(s, "control"), "name"));
+    if (json_is_true(json_object_get(s, "queue_held")))
+        printf("queue     held; look: gonio queue, go on: gonio queue release\n");
     json_array_foreach(json_object_get(s, "devices"), i, each) print_device(each);
     if (*text_of(s, "last_error"))
         printf("last error: %s\n", text_of(s, "last_error"));

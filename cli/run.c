@@ -70,6 +70,9 @@ static int begun(const struct options *o, const struct interrupt *i, json_t *rep
         if (!o->remote.json)
             fprintf(stderr, "run %d %s%s\n", run, w->begun,
                     o->detach ? ". Watch it: gonio watch" : "");
+        if (json_is_true(json_object_get(reply, "queue_held")))
+            out_say("the queue is held: run %d waits; look: gonio queue, go on: gonio queue release",
+                    run);
         if (!o->detach)
             status = follow(&o->remote, i, reply, json_object_get(reply, "event_id"));
     }

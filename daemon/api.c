@@ -8,6 +8,7 @@
 
 #include <jansson.h>
 #include <limits.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -113,6 +114,8 @@ static struct http_reply get_status(const struct call *c)
                   s.uptime_s, "directory", s.directory, "event_id", (json_int_t)s.event_id,
                   "last_error", s.last_error, "queued", queued);
     json_object_set_new(o, "state", json_string(active ? run_state_name(active->state) : "idle"));
+    json_object_set_new(o, "control", view_control(hub_control(c->hub)));
+    json_object_set_new(o, "queue_held", json_boolean(queue_is_held(q)));
     json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
     json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
     return reply(200, view_text(o));
@@ -257,23 +260,102 @@ static struct http_reply post_resume(const struct call *c)
     return told(c, run, &err);
 }
 
+// --- who commands -------------------------------------------------------------------------------
+
+static struct http_reply get_control(const struct call *c)
+{
+    return reply(200, view_text(json_pack("{s:o}", "control", view_control(hub_control(c->hub)))));
+}
+
+static int change_control(const struct call *c, const char *what, const char *reason,
+                          const char *from, struct gon_error *err)
+{
+    if (!strcmp(what, "take"))
+        return hub_control_take(c->hub, c->request->name, reason, from, err);
+    if (!strcmp(what, "release"))
+        return hub_control_release(c->hub, c->request->name, err);
+    return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\"; use take or release", what);
+}
+
+static struct http_reply post_control(const struct call *c)
+{
+    json_error_t e;
+    struct gon_error err;
+    const char *what, *reason = NULL, *from = NULL;
+    json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
+    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s, s?s}", "do", &what, "reason",
+                                &reason, "from", &from) < 0) {
+        json_decref(body);
+        return fail(400, e.text, "the request's body",
+                    "send {\"do\": \"take\"|\"release\", \"reason\": text, \"from\": name}");
+    }
+    const int rc = change_control(c, what, reason, from, &err);
+    json_decref(body);
+    return rc < 0 ? failed(&err) : get_control(c);
+}
+
+// --- the queue ----------------------------------------------------------------------------------
+
+static struct http_reply get_queue(const struct call *c)
+{
+    return reply(200, view_text(view_queue(hub_queue(c->hub))));
+}
+
+static int arrange(const struct call *c, const char *what, int run, int place,
+                   struct gon_error *err)
+{
+    char by[40];
+    snprintf(by, sizeof by, "uid %ld", c->request->uid);
+    if (!strcmp(what, "hold") || !strcmp(what, "release"))
+        return hub_queue_hold(c->hub, run, *what == 'h', err);
+    if (!strcmp(what, "remove"))
+        return hub_queue_remove(c->hub, run, by, err);
+    if (!strcmp(what, "move"))
+        return hub_queue_move(c->hub, run, place, err);
+    return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\"; use hold, release, remove or move", what);
+}
+
+static struct http_reply post_queue(const struct call *c)
+{
+    json_error_t e;
+    struct gon_error err;
+    const char *what;
+    int run = 0, place = 0;
+    json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
+    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?i, s?i}", "do", &what, "run", &run,
+                                "place", &place) < 0) {
+        json_decref(body);
+        return fail(400, e.text, "the request's body",
+                    "send {\"do\": \"hold\"|\"release\"|\"remove\"|\"move\", \"run\": number, "
+                    "\"place\": number}");
+    }
+    const int rc = arrange(c, what, run, place, &err);
+    json_decref(body);
+    return rc < 0 ? failed(&err) : get_queue(c);
+}
+
 // --- routes -------------------------------------------------------------------------------------
 
 static const struct route {
     const char *method, *path; // a path that ends with '/' has a rest
     struct http_reply (*handle)(const struct call *c);
     const char *allow; // all methods of that path
+    bool controlled;   // only for who has control, while somebody has
 } routes[] = {
-    {"GET", "/api/v1/status", get_status, "GET"},
-    {"GET", "/api/v1/devices", get_devices, "GET"},
-    {"GET", "/metrics", get_metrics, "GET"},
-    {"GET", "/api/v1/runs", get_runs, "GET, POST"},
-    {"POST", "/api/v1/runs", post_runs, "GET, POST"},
-    {"GET", "/api/v1/runs/", get_run, "GET"},
-    {"GET", "/api/v1/events", get_events, "GET"},
-    {"POST", HTTP_STOP_PATH, post_stop, "POST"},
-    {"POST", "/api/v1/pause", post_pause, "POST"},
-    {"POST", "/api/v1/resume", post_resume, "POST"},
+    {"GET", "/api/v1/status", get_status, "GET", false},
+    {"GET", "/api/v1/devices", get_devices, "GET", false},
+    {"GET", "/metrics", get_metrics, "GET", false},
+    {"GET", "/api/v1/runs", get_runs, "GET, POST", false},
+    {"POST", "/api/v1/runs", post_runs, "GET, POST", true},
+    {"GET", "/api/v1/runs/", get_run, "GET", false},
+    {"GET", "/api/v1/queue", get_queue, "GET, POST", false},
+    {"POST", "/api/v1/queue", post_queue, "GET, POST", true},
+    {"GET", "/api/v1/control", get_control, "GET, POST", false},
+    {"POST", "/api/v1/control", post_control, "GET, POST", false},
+    {"GET", "/api/v1/events", get_events, "GET", false},
+    {"POST", HTTP_STOP_PATH, post_stop, "POST", false},
+    {"POST", "/api/v1/pause", post_pause, "POST", true},
+    {"POST", "/api/v1/resume", post_resume, "POST", true},
 };
 
 static const char *rest_of(const struct route *r, const char *path)
@@ -292,13 +374,18 @@ struct http_reply api_request(void *hub, const struct http_request *request, uin
         struct call c = {hub, request, ticket, rest_of(&routes[i], request->path)};
         if (!c.rest)
             continue;
+        struct gon_error err;
         if (!strcmp(routes[i].method, request->method))
-            return routes[i].handle(&c);
+            return routes[i].controlled &&
+                           control_check(hub_control(c.hub), request->name, &err) < 0
+                       ? failed(&err)
+                       : routes[i].handle(&c);
         same_path = &routes[i];
     }
     if (!same_path)
         return fail(404, "there is no such resource", request->path,
-                    "see /api/v1/status, /api/v1/devices, /api/v1/runs, /api/v1/events, /metrics");
+                    "see /api/v1/status, /api/v1/devices, /api/v1/runs, /api/v1/queue, "
+                    "/api/v1/control, /api/v1/events, /metrics");
     char use[40];
     snprintf(use, sizeof use, "use: %s", same_path->allow);
     struct http_reply r = fail(405, "that method is not for this resource", request->path, use);

@@ -178,6 +178,7 @@ int fitter_start(const struct fitter_links *links, struct fitter **ret_fitter,
         fitter_free(f);
         return gon_fail(err, GON_E_SYSTEM, "fit thread: %s", strerror(failed));
     }
+    (void)pthread_setname_np(f->thread, "fit"); // for top -H and debuggers
     *ret_fitter = f;
     return GON_OK;
 }

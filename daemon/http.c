@@ -232,6 +232,32 @@ static void peer_of(struct MHD_Connection *c, struct http_request *ret_request)
     }
 }
 
+static bool is_printable(const char *text)
+{
+    for (; *text; text++)
+        if ((unsigned char)*text < 0x20 || *text == 0x7f)
+            return false;
+    return true;
+}
+
+// False: it is there, and is no name.
+static bool name_of(struct MHD_Connection *c, char ret_name[HTTP_NAME])
+{
+    char decoded[3 * HTTP_NAME];
+    const char *text = MHD_lookup_connection_value(c, MHD_HEADER_KIND, HTTP_NAME_HEADER);
+    *ret_name = 0;
+    if (!text)
+        return true;
+    if (strlen(text) >= sizeof decoded)
+        return false;
+    memcpy(decoded, text, strlen(text) + 1);
+    const size_t size = MHD_http_unescape(decoded);
+    if (size >= HTTP_NAME || size != strlen(decoded) || !is_printable(decoded))
+        return false;
+    memcpy(ret_name, decoded, size + 1);
+    return true;
+}
+
 static struct http_reply handle(struct exchange *x, const char *method, const char *path)
 {
     if (x->swallowed > MOST_BODY)
@@ -240,7 +266,12 @@ static struct http_reply handle(struct exchange *x, const char *method, const ch
         return refuse(503, "the daemon is ending", "start it again");
     struct http_request r = {
         .method = method, .path = path, .body = x->body ? x->body : "", .size = x->size};
+    char name[HTTP_NAME];
     peer_of(x->connection, &r);
+    r.name = name;
+    if (!name_of(x->connection, name))
+        return refuse(400, "the header " HTTP_NAME_HEADER " is no name",
+                      "send at most 64 printable bytes, percent-encoded");
     log_say(x->http->log, strcmp(method, "GET") ? LOG_INFO : LOG_DEBUG, "http",
             "%s %s from pid %ld uid %ld", method, path, r.pid, r.uid);
     return x->http->ports.request(x->http->ports.ctx, &r, x->ticket);

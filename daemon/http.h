@@ -14,6 +14,9 @@
 #include <stdint.h>
 
 #define HTTP_STOP_PATH "/api/v1/stop"
+// Who asks, as they call themselves: percent-encoded UTF-8, at most 64 bytes when decoded.
+#define HTTP_NAME_HEADER "Gonio-Name"
+enum { HTTP_NAME = 65 };
 
 struct http;
 struct log;
@@ -24,6 +27,7 @@ struct http_request {
     const char *body;          // NUL-terminated; may hold NULs before its end
     size_t size;
     long pid, uid;             // of the peer, as the kernel says; -1 unknown
+    const char *name;          // as they call themselves, printable; "" when they do not
 };
 
 enum { HTTP_LATER = 0, HTTP_STREAM = -1 };

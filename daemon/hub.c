@@ -4,10 +4,13 @@
 #include "base/cancel.h"
 #include "base/clk.h"
 #include "base/log.h"
+#include "campaign/bench.h"
+#include "campaign/state.h"
 #include "daemon/api.h"
 #include "daemon/fitter.h"
 #include "daemon/loop.h"
 #include "daemon/material.h"
+#include "daemon/messenger.h"
 #include "daemon/note.h"
 #include "daemon/runner.h"
 #include "daemon/storer.h"
@@ -17,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EVENTS = 4096, MOST_EVENT_BYTES = 4 * 1024 * 1024, MOST_STOPS = 32 };
+enum { MOST_EVENTS = 4096, MOST_EVENT_BYTES = 4 * 1024 * 1024, MOST_STOPS = 32, MOST_KEPT = 1000 };
 
 struct hub {
     struct hub_options options;
@@ -27,6 +30,9 @@ struct hub {
     struct events *events;
     struct http *http;
     struct queue *queue;
+    struct control control;
+    struct messenger *messenger;           // NULL: nobody is told
+    const char *notify[BENCH_NOTIFY + 1];  // its command
     struct storer *storer;
     struct runner *runner;
     struct fitter *fitter;
@@ -82,6 +88,14 @@ static void keep_state(struct hub *h, const struct run *run)
     note_post(h->store_box, n);
 }
 
+static void tell(struct hub *h, const struct run *run)
+{
+    if (run->state != RUN_PAUSED && run->state != RUN_FAILED && run->state != RUN_DONE)
+        return;
+    const struct message m = {run->id, run_state_name(run->state), run->name, run->path, run->text};
+    messenger_tell(h->messenger, &m);
+}
+
 static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
@@ -95,6 +109,7 @@ static void changed(void *ctx, const struct run *run)
     else if (run->state == RUN_RUNNING || run->state == RUN_DONE)
         h->last_error[0] = 0; // it was overcome; the log and the file's events keep it
     publish(h, "state", view_run(run, false));
+    tell(h, run);
     if (run == queue_active(h->queue))
         keep_state(h, run);
     if (run == queue_active(h->queue) || queue_idle(h->queue))
@@ -193,6 +208,27 @@ static void cancel_port(void *ctx)
     cancel_request(h->cancel);
 }
 
+static void keep_port(void *ctx)
+{
+    struct hub *h = ctx;
+    struct queue_entry entries[MOST_KEPT];
+    const size_t count = queue_entries(h->queue, entries, MOST_KEPT);
+    struct note *n = note_new(NOTE_QUEUE);
+    struct state_queue *kept = state_queue_new(count);
+    for (size_t i = 0; kept && i < count; i++) {
+        struct state_entry *e = &kept->entries[i];
+        *e = (struct state_entry){
+            .run = entries[i].run->id, .held = entries[i].run->held, .active = entries[i].active};
+        snprintf(e->path, sizeof e->path, "%s", entries[i].run->path);
+    }
+    n->thing = kept;
+    if (kept)
+        note_post(h->store_box, n);
+    else
+        note_free(n);
+    publish(h, "queue", view_queue(h->queue));
+}
+
 static void rearm_port(void *ctx)
 {
     struct hub *h = ctx;
@@ -212,6 +248,7 @@ char *hub_submitted(const struct hub *h, int run, uint64_t event_id)
     const struct run *r = queue_run(h->queue, run);
     json_t *o = view_run(r, false);
     json_object_set_new(o, "event_id", json_integer((json_int_t)event_id));
+    json_object_set_new(o, "queue_held", json_boolean(queue_is_held(h->queue)));
     return view_text(o);
 }
 
@@ -259,6 +296,17 @@ static bool is_paused(const struct hub *h, int run)
     return active && active->id == run && active->state == RUN_PAUSED;
 }
 
+// A run that only waits because it, or the queue, is held goes on first of all.
+static bool release(struct hub *h, int id)
+{
+    const struct run *run = queue_run(h->queue, id);
+    if ((!run->held && !queue_is_held(h->queue)) || queue_move(h->queue, id, 1, NULL) < 0)
+        return false;
+    queue_hold(h->queue, id, false, NULL);
+    queue_hold(h->queue, 0, false, NULL);
+    return true;
+}
+
 int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err)
 {
     const struct run *known = queue_run(h->queue, run);
@@ -266,6 +314,8 @@ int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err)
         int rc = hub_resume(h, err);
         return rc < 0 ? rc : 1;
     }
+    if (known && release(h, run))
+        return 1;
     int rc = known ? queue_may_submit(h->queue, run, err) : GON_OK;
     if (rc < 0)
         return rc;
@@ -328,7 +378,67 @@ int hub_pause(struct hub *h, struct gon_error *err)
 
 int hub_resume(struct hub *h, struct gon_error *err)
 {
+    struct queue_entry first;
+    if (queue_idle(h->queue) && queue_is_held(h->queue) && queue_entries(h->queue, &first, 1)) {
+        queue_hold(h->queue, 0, false, NULL);
+        return first.run->id;
+    }
     return to_active(h, NOTE_RESUME, 1u << RUN_PAUSED, err);
+}
+
+// --- who commands --------------------------------------------------------------------------------
+
+const struct control *hub_control(const struct hub *h)
+{
+    return &h->control;
+}
+
+static int control_changed(struct hub *h, int rc, const char *what)
+{
+    if (rc < 0)
+        return rc;
+    log_say(h->options.log, LOG_NOTICE, "control", "%s", what);
+    publish(h, "control", json_pack("{s:o}", "control", view_control(&h->control)));
+    return rc;
+}
+
+int hub_control_take(struct hub *h, const char *name, const char *reason, const char *from,
+                     struct gon_error *err)
+{
+    char what[2 * CONTROL_NAME + CONTROL_REASON + 40];
+    const char *before = h->control.name;
+    snprintf(what, sizeof what, "%.64s takes control%s%s%s%.160s", name,
+             *before && strcmp(before, name) ? " from " : "",
+             *before && strcmp(before, name) ? before : "", reason && *reason ? ": " : "",
+             reason ? reason : "");
+    return control_changed(h,
+                           control_take(&h->control, name, reason, from,
+                                        clk_utc_ns(clk_system()) / 1000000, err),
+                           what);
+}
+
+int hub_control_release(struct hub *h, const char *name, struct gon_error *err)
+{
+    char what[CONTROL_NAME + 40];
+    snprintf(what, sizeof what, "%s releases control", name);
+    return control_changed(h, control_release(&h->control, name, err), what);
+}
+
+// --- the queue's order ---------------------------------------------------------------------------
+
+int hub_queue_remove(struct hub *h, int run, const char *by, struct gon_error *err)
+{
+    return queue_remove(h->queue, run, by, err);
+}
+
+int hub_queue_move(struct hub *h, int run, int place, struct gon_error *err)
+{
+    return queue_move(h->queue, run, place, err);
+}
+
+int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err)
+{
+    return queue_hold(h->queue, run, held, err);
 }
 
 // --- what the workers say ------------------------------------------------------------------------
@@ -378,6 +488,27 @@ static void halted(struct hub *h, const struct note *n)
     }
 }
 
+static void restored(struct hub *h, const struct note *n)
+{
+    const struct state_queue *earlier = n->thing;
+    for (size_t i = 0; earlier && i < earlier->count; i++)
+        queue_restore(h->queue, earlier->entries[i].run, earlier->entries[i].held);
+    if (queue_is_held(h->queue))
+        log_say(h->options.log, LOG_NOTICE, "queue",
+                "held, as goniod was started anew; look: gonio queue, go on: gonio queue release");
+}
+
+// Before the list is complete: it could not be read either, and the folder may be another's.
+static void unkept(struct hub *h, const struct note *n)
+{
+    log_say(h->options.log, LOG_ERR, "queue", "%s", n->err.text);
+    snprintf(h->last_error, sizeof h->last_error, "%s", n->err.text);
+    if (!h->listed && !h->ended_said) {
+        h->ended_said = true;
+        h->options.ended(h->options.ctx, &n->err);
+    }
+}
+
 static void take_snapshot(struct hub *h, struct note *n)
 {
     free(h->snapshot);
@@ -407,6 +538,8 @@ static void take(struct hub *h, struct note *n)
         if (n->err.code)
             log_say(h->options.log, LOG_WARN, "store", "%s", n->err.text);
         break;
+    case NOTE_RESTORED: restored(h, n); break;
+    case NOTE_UNKEPT: unkept(h, n); break;
     case NOTE_KNOWN: known(h, n); break;
     case NOTE_FOUND: found(h, n); break;
     case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
@@ -462,10 +595,21 @@ static int start_workers(struct hub *h, struct gon_error *err)
     return rc < 0 ? rc : runner_start(&r, &h->runner, err);
 }
 
+static int start_messenger(struct hub *h, struct gon_error *err)
+{
+    const struct bench_config *bench = h->options.bench;
+    if (!bench->notify.argc)
+        return GON_OK;
+    for (int i = 0; i < bench->notify.argc; i++)
+        h->notify[i] = bench->notify.argv[i];
+    const struct messenger_command command = {h->notify, bench->notify.limit_s};
+    return messenger_new(h->loop, &command, h->options.log, &h->messenger, err);
+}
+
 static int build(struct hub *h, int listen_fd, struct gon_error *err)
 {
     struct queue_ports q = {h,          open_port,   start_port, fit_port,
-                            close_port, cancel_port, rearm_port, changed};
+                            close_port, cancel_port, rearm_port, changed, keep_port};
     struct http_ports p = {h, api_request};
     // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be
     // late.
@@ -481,6 +625,7 @@ static int build(struct hub *h, int listen_fd, struct gon_error *err)
         !h->queue)
         return gon_fail(err, GON_E_SYSTEM, "daemon: out of memory or descriptors");
     int rc = loop_add(h->loop, mail_fd(h->box), mail_arrived, h, err);
+    rc = rc < 0 ? rc : start_messenger(h, err);
     rc = rc < 0 ? rc : start_workers(h, err);
     if (rc < 0)
         return rc;
@@ -535,6 +680,7 @@ bool hub_free(struct hub *h)
     storer_join(h->storer);
     http_free(h->http);
     queue_free(h->queue);
+    messenger_free(h->messenger);
     events_free(h->events);
     if (h->box)
         loop_remove(h->loop, mail_fd(h->box));

@@ -3,6 +3,7 @@
 // and HTTP. It touches no device and no file itself.
 #pragma once
 #include "base/err.h"
+#include "daemon/control.h"
 #include "daemon/events.h"
 #include "daemon/http.h"
 #include "daemon/instrument.h"
@@ -61,7 +62,19 @@ void hub_find(struct hub *h, int run, uint64_t ticket); // one that the queue do
 // answered.
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket);
 int hub_pause(struct hub *h, struct gon_error *err);  // the run that has the bench: its id
-int hub_resume(struct hub *h, struct gon_error *err); // the paused run: its id
+// The paused run, or when none has the bench a held queue: the id of the run that goes on.
+int hub_resume(struct hub *h, struct gon_error *err);
+
+// As control.h; the time is now.
+const struct control *hub_control(const struct hub *h);
+int hub_control_take(struct hub *h, const char *name, const char *reason, const char *from,
+                     struct gon_error *err);
+int hub_control_release(struct hub *h, const char *name, struct gon_error *err);
+
+// The queue's order; as queue.h. by: who asks.
+int hub_queue_remove(struct hub *h, int run, const char *by, struct gon_error *err);
+int hub_queue_move(struct hub *h, int run, int place, struct gon_error *err);
+int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err);
 
 uint64_t hub_event_id(const struct hub *h); // of the newest event
 // A run with the id of the event after which all of it can be followed, as JSON text.

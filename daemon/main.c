@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // goniod: reads its options and the bench, then runs the hub until a signal ends it.
 #include "base/cfg.h"
+#include "base/clk.h"
 #include "base/log.h"
 #include "base/options.h"
 #include "base/paths.h"
@@ -10,6 +11,7 @@
 #include "daemon/hub.h"
 #include "daemon/listener.h"
 #include "daemon/loop.h"
+#include "daemon/service.h"
 #include "daemon/simulator.h"
 
 #include <signal.h>
@@ -49,6 +51,9 @@ static const struct option_row rows[] = {
 enum { DESCRIPTORS_LEAST = 128, DESCRIPTORS_MOST = 1024 };
 
 #define END_S 4.5 // from the signal, whatever hangs
+// An instrument thread that has not looked at the bench for so long hangs; a dead USB device holds
+// it for 5 s.
+#define LOOKS_S 6.0
 #define ENDED_ALL_THE_SAME                                                                         \
     "goniod: a device or the disk does not answer; ended all the same. Readings are safe. "
 
@@ -64,6 +69,9 @@ struct daemon {
     struct hub *hub;
     struct deadline *deadline; // NULL: not ending yet
     bool dark;                 // the laser, when the bench was last looked at
+    int64_t looked_ns;         // then
+    struct service *service;   // NULL: no service manager listens
+    bool ready;                // was told
     int status;                // exit status
 };
 
@@ -125,6 +133,7 @@ static void looked(void *ctx, const struct instrument_snapshot *s)
 {
     struct daemon *d = ctx;
     d->dark = instrument_is_dark(s);
+    d->looked_ns = clk_now_ns(clk_system());
     deadline_say(d->deadline, last_words(d->dark));
 }
 
@@ -133,6 +142,7 @@ static void signaled(void *ctx, int signal)
     struct daemon *d = ctx;
     log_say(d->log, LOG_NOTICE, "goniod", "signal %d: ending; the laser first, then the axes",
             signal);
+    service_ending(d->service);
     if (!d->deadline)
         d->deadline = deadline_set(END_S, last_words(d->dark), 1);
     hub_end(d->hub);
@@ -167,7 +177,9 @@ static const char *axes_text(const struct instrument_snapshot *s)
 
 static void ready(void *ctx, const struct instrument_snapshot *s)
 {
-    (void)ctx;
+    struct daemon *d = ctx;
+    service_ready(d->service);
+    d->ready = true;
     for (int i = 0; i < PART_COUNT; i++)
         if (s->part[i].link == PART_LOST)
             printf("waiting for %s\n", s->part[i].problem);
@@ -177,6 +189,29 @@ static void ready(void *ctx, const struct instrument_snapshot *s)
            : instrument_is_dark(s) ? "off"
                                    : "NOT OFF: use its key or the interlock");
     fflush(stdout);
+}
+
+static void say_status(struct daemon *d)
+{
+    char text[200];
+    const struct run *run = queue_active(hub_queue(d->hub));
+    if (run)
+        snprintf(text, sizeof text, "run %d (%s) %s, %d of %d points", run->id, run->name,
+                 run_state_name(run->state), run->done, run->total);
+    else
+        snprintf(text, sizeof text, "idle, laser %s", d->dark ? "off" : "NOT OFF");
+    service_status(d->service, text);
+}
+
+// The watchdog is fed by two threads: this one is here, the instrument's has looked at the bench.
+// The store's is left out: a disk may stall for a minute, which pauses the run, with the laser off.
+static void alive(void *ctx)
+{
+    struct daemon *d = ctx;
+    if (d->ready)
+        say_status(d);
+    if (clk_now_ns(clk_system()) - d->looked_ns < CLK_S(LOOKS_S))
+        service_alive(d->service);
 }
 
 // --- beginning and end ---------------------------------------------------------------------------
@@ -281,6 +316,8 @@ static int open_hub(struct daemon *d, struct gon_error *err)
     rc = rc < 0 ? rc : loop_signals(d->loop, signaled, d, err);
     if (rc == 0 && d->simulator)
         rc = loop_add(d->loop, simulator_fd(d->simulator), simulator_ended, d, err);
+    if (rc == 0 && d->service)
+        rc = loop_every(d->loop, 1000, alive, d, err);
     return rc;
 }
 
@@ -289,11 +326,13 @@ static int run(struct daemon *d)
 {
     struct gon_error err;
     int rc = allow_descriptors(&err);
+    rc = rc < 0 ? rc : service_open(&d->service, &err);
     rc = rc < 0 ? rc : open_socket(d, &err);
     rc = rc < 0 ? rc : open_bench(d, &err);
     rc = rc < 0 ? rc : open_places(d, &err);
     if (rc == 0) {
         print_banner(d);
+        d->looked_ns = clk_now_ns(clk_system()); // opening the bench has its time, too
         d->loop = loop_new(&err);
         rc = d->loop ? open_hub(d, &err) : GON_E_SYSTEM;
     }
@@ -309,6 +348,7 @@ static int run(struct daemon *d)
     loop_free(d->loop);
     simulator_stop(d->simulator);
     listener_close(d->listener);
+    service_close(d->service);
     free(d->bench_text);
     return d->status;
 }

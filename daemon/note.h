@@ -23,6 +23,7 @@ enum note_kind {
     NOTE_STATE,   // run, state, text: why
     NOTE_FIT,     // run, sweep, last, thing: struct fit_outcome
     NOTE_CLOSE,   // run, state, text: why
+    NOTE_QUEUE,   // thing: struct state_queue, to keep
     // to the instrument thread
     NOTE_START,   // run, thing: struct run_material
     NOTE_STORED,  // sequence, err
@@ -31,6 +32,8 @@ enum note_kind {
     // to the fit thread
     NOTE_FIT_WANTED, // run, sweep, last, name: path
     // to the main thread
+    NOTE_RESTORED, // thing: struct state_queue of an earlier life; after the runs, before their end
+    NOTE_UNKEPT,   // err: why the queue could not be kept, or (before LISTED's end) not be read
     NOTE_LISTED,   // thing: struct run (one a note); NULL: that was all; err
     NOTE_KNOWN,    // ticket, thing: struct run; NULL: err, and text: all complaints
     NOTE_FOUND,    // ticket, run, thing: struct run; NULL: there is none

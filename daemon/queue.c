@@ -20,6 +20,7 @@ struct queue {
     struct run *active;
     enum run_state ended_as;
     bool stopping, ending;
+    bool held; // starts nothing more
 };
 
 struct queue *queue_new(const struct queue_ports *ports)
@@ -51,12 +52,41 @@ static struct run *find(const struct queue *q, int id)
     return NULL;
 }
 
-static bool is_waiting(const struct queue *q, int id)
+// Its place among those that wait; -1: it does not.
+static int place_of(const struct queue *q, int id)
 {
     for (size_t i = 0; i < q->waiting_count; i++)
         if (q->waiting[i] == id)
-            return true;
-    return false;
+            return (int)i;
+    return -1;
+}
+
+static bool is_waiting(const struct queue *q, int id)
+{
+    return place_of(q, id) >= 0;
+}
+
+static void keep(struct queue *q)
+{
+    if (!q->ending)
+        q->ports.keep(q->ports.ctx);
+}
+
+static int take_out(struct queue *q, int place)
+{
+    const int id = q->waiting[place];
+    q->waiting_count--;
+    memmove(q->waiting + place, q->waiting + place + 1,
+            (q->waiting_count - (size_t)place) * sizeof *q->waiting);
+    return id;
+}
+
+static void put_in(struct queue *q, int place, int id)
+{
+    memmove(q->waiting + place + 1, q->waiting + place,
+            (q->waiting_count - (size_t)place) * sizeof *q->waiting);
+    q->waiting[place] = id; // there is room for every known run
+    q->waiting_count++;
 }
 
 static bool make_room(struct queue *q)
@@ -109,12 +139,21 @@ static void change(struct queue *q, struct run *run, enum run_state state, const
     q->ports.changed(q->ports.ctx, run);
 }
 
+// The first that is not held; -1: none.
+static int first_ready(const struct queue *q)
+{
+    for (size_t i = 0; i < q->waiting_count && !q->held; i++)
+        if (!find(q, q->waiting[i])->held)
+            return (int)i;
+    return -1;
+}
+
 static void next(struct queue *q)
 {
-    if (q->active || !q->waiting_count || q->ending)
+    const int place = q->active || q->ending ? -1 : first_ready(q);
+    if (place < 0)
         return;
-    q->active = find(q, q->waiting[0]);
-    memmove(q->waiting, q->waiting + 1, --q->waiting_count * sizeof *q->waiting);
+    q->active = find(q, take_out(q, place));
     q->phase = OPENING;
     q->ports.open(q->ports.ctx, q->active);
 }
@@ -140,12 +179,99 @@ int queue_submit(struct queue *q, int id, struct gon_error *err)
     int rc = queue_may_submit(q, id, err);
     if (rc < 0)
         return rc;
-    q->waiting[q->waiting_count++] = id; // there is room for every known run
+    put_in(q, (int)q->waiting_count, id);
     run->fits_open = 0;
-    run->fit_failed = false;
+    run->fit_failed = run->held = false;
     change(q, run, RUN_QUEUED, NULL);
     next(q);
+    keep(q);
     return GON_OK;
+}
+
+// --- the order -----------------------------------------------------------------------------------
+
+size_t queue_entries(const struct queue *q, struct queue_entry *ret_entries, size_t most)
+{
+    size_t n = 0;
+    if (q->active && n < most)
+        ret_entries[n++] = (struct queue_entry){q->active, true};
+    for (size_t i = 0; i < q->waiting_count && n < most; i++)
+        ret_entries[n++] = (struct queue_entry){find(q, q->waiting[i]), false};
+    return n;
+}
+
+void queue_restore(struct queue *q, int id, bool held)
+{
+    struct run *run = find(q, id);
+    if (!run || run->state == RUN_DONE || is_waiting(q, id))
+        return;
+    run->held = held;
+    q->held = true;
+    put_in(q, (int)q->waiting_count, id);
+}
+
+static int waits(const struct queue *q, int id, struct gon_error *err)
+{
+    const int place = place_of(q, id);
+    if (place < 0)
+        return gon_fail(err, GON_E_INPUT, "run %d does not wait in the queue; see: gonio queue", id);
+    return place;
+}
+
+int queue_remove(struct queue *q, int id, const char *by, struct gon_error *err)
+{
+    char why[100];
+    const int place = waits(q, id, err);
+    if (place < 0)
+        return place;
+    take_out(q, place);
+    snprintf(why, sizeof why, "taken out of the queue by %s", by);
+    change(q, find(q, id), RUN_STOPPED, why);
+    keep(q);
+    return GON_OK;
+}
+
+int queue_move(struct queue *q, int id, int place, struct gon_error *err)
+{
+    const int from = waits(q, id, err);
+    if (from < 0)
+        return from;
+    if (place < 1 || (size_t)place > q->waiting_count)
+        return gon_fail(err, GON_E_INPUT, "place %d: the queue has 1 to %zu", place,
+                        q->waiting_count);
+    put_in(q, place - 1, take_out(q, from));
+    keep(q);
+    return GON_OK;
+}
+
+// Until then they are what they were when the daemon died.
+static void wake_restored(struct queue *q)
+{
+    for (size_t i = 0; i < q->waiting_count && !q->held; i++) {
+        struct run *run = find(q, q->waiting[i]);
+        if (run->state != RUN_QUEUED)
+            change(q, run, RUN_QUEUED, NULL);
+    }
+}
+
+int queue_hold(struct queue *q, int id, bool held, struct gon_error *err)
+{
+    const int place = id ? waits(q, id, err) : 0;
+    if (place < 0)
+        return place;
+    if (id)
+        find(q, id)->held = held;
+    else
+        q->held = held;
+    wake_restored(q);
+    next(q);
+    keep(q);
+    return GON_OK;
+}
+
+bool queue_is_held(const struct queue *q)
+{
+    return q->held;
 }
 
 static void put_back(struct queue *q, const char *why)
@@ -160,11 +286,13 @@ bool queue_stop(struct queue *q, const char *why)
 {
     bool any = q->active || q->waiting_count;
     put_back(q, why);
+    q->held = false;
     if (q->active && q->phase < CLOSING && !q->stopping) {
         q->stopping = true;
         q->ports.cancel(q->ports.ctx);
         change(q, q->active, RUN_STOPPING, why);
     }
+    keep(q);
     return any;
 }
 
@@ -185,6 +313,7 @@ static void finish(struct queue *q, enum run_state state, const char *text)
         q->ports.rearm(q->ports.ctx);
     change(q, run, state, text);
     next(q);
+    keep(q);
 }
 
 // How it ended, for the file and for those who watch; the warning first.

@@ -27,7 +27,8 @@ struct run {
     // Of the last reading; NAN before there is one.
     double theta_i_deg, theta_r_deg, f_per_sr, u_per_sr;
     unsigned flags;
-    double left_s;       // NAN unknown
+    double left_s;       // NAN unknown; of one that waits: for all of it
+    bool held;           // waits until it is released
     enum safety_light light;
     bool wanted; // the pause is the operator's: nothing is wrong
     int fits_open;       // asked for and not yet stored
@@ -45,6 +46,7 @@ struct queue_ports {
     void (*cancel)(void *ctx);   // ask the workers to stop
     void (*rearm)(void *ctx);    // they have all stopped
     void (*changed)(void *ctx, const struct run *run); // its state
+    void (*keep)(void *ctx);     // the queue, as queue_entries gives it
 };
 
 struct queue *queue_new(const struct queue_ports *ports); // NULL without memory
@@ -59,6 +61,24 @@ struct run *queue_know(struct queue *q, const struct run *run);
 int queue_submit(struct queue *q, int id, struct gon_error *err);
 // Whether it would: the same errors.
 int queue_may_submit(const struct queue *q, int id, struct gon_error *err);
+
+// --- the order -----------------------------------------------------------------------------------
+
+// What waits, in its order; the run that has the bench, if any, first.
+struct queue_entry {
+    const struct run *run;
+    bool active;
+};
+size_t queue_entries(const struct queue *q, struct queue_entry *ret_entries, size_t most);
+// Of an earlier life, in that order: it waits as what it was, and the queue is held. What is done or
+// not known is left out.
+void queue_restore(struct queue *q, int id, bool held);
+
+// GON_E_INPUT: that run does not wait in the queue, or no such place. by: "uid 1000", for its text.
+int queue_remove(struct queue *q, int id, const char *by, struct gon_error *err);
+int queue_move(struct queue *q, int id, int place, struct gon_error *err); // 1: the next one
+int queue_hold(struct queue *q, int id, bool held, struct gon_error *err); // id 0: the queue
+bool queue_is_held(const struct queue *q);
 
 // Ends the run that has the bench and empties the queue; false when there is nothing to stop.
 bool queue_stop(struct queue *q, const char *why);

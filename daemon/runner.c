@@ -290,6 +290,7 @@ int runner_start(const struct runner_links *links, struct runner **ret_runner,
         free(r);
         return gon_fail(err, GON_E_SYSTEM, "instrument thread: %s", strerror(failed));
     }
+    (void)pthread_setname_np(r->thread, "instrument"); // for top -H and debuggers
     *ret_runner = r;
     return GON_OK;
 }

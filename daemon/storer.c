@@ -6,6 +6,7 @@
 #include "campaign/plan_states.h"
 #include "campaign/reduce.h"
 #include "campaign/store.h"
+#include "daemon/keeper.h"
 #include "daemon/material.h"
 #include "daemon/note.h"
 #include "daemon/outcome.h"
@@ -22,6 +23,7 @@ struct storer {
     struct store *store; // open for writing; NULL: none
     int run;
     char state[16]; // the last written
+    struct keeper *keeper; // NULL: not opened yet, or it cannot be
     int highest;    // number that anybody was told: the next campaign's is above it
 };
 
@@ -38,6 +40,7 @@ void storer_free(struct storer *s)
     if (!s)
         return;
     store_close(s->store, NULL);
+    keeper_free(s->keeper);
     free(s);
 }
 
@@ -91,21 +94,41 @@ static struct run *run_of(struct storer *s, const struct catalog_entry *e)
     return run;
 }
 
+static struct run *listed_run(struct storer *s, const struct catalog_entry *e)
+{
+    struct run *run = e->id > 0 ? run_of(s, e) : NULL;
+    if (run && s->keeper && keeper_had(s->keeper, e->id))
+        run->left_s = catalog_left_s(e, s->links.bench);
+    return run;
+}
+
+// The folder is this daemon's from here on, and what was queued in it is told after the runs.
 static void list(struct storer *s)
 {
     struct catalog_entry *entries = NULL;
-    struct note *end = note_new(NOTE_LISTED);
+    struct note *end = note_new(NOTE_LISTED), *unkept = note_new(NOTE_UNKEPT);
+    s->keeper = keeper_new(s->links.directory, &unkept->err);
     int count = catalog_list(s->links.directory, &entries, &end->err);
     for (int i = 0; i < count; i++) {
         struct note *n = note_new(NOTE_LISTED);
-        n->thing = entries[i].id > 0 ? run_of(s, &entries[i]) : NULL;
+        n->thing = listed_run(s, &entries[i]);
         if (n->thing)
             note_post(s->links.to_main, n);
         else
             note_free(n);
     }
     free(entries);
+    note_post(s->links.to_main, s->keeper ? keeper_restored(s->keeper) : unkept);
+    if (s->keeper)
+        note_free(unkept);
     note_post(s->links.to_main, end);
+}
+
+static void keep_queue(struct storer *s, const struct note *n)
+{
+    struct note *complaint = s->keeper ? keeper_keep(s->keeper, n) : NULL;
+    if (complaint)
+        note_post(s->links.to_main, complaint);
 }
 
 // --- a new campaign ------------------------------------------------------------------------------
@@ -167,6 +190,8 @@ static void answer_known(struct storer *s, const struct note *question, enum not
         n->err = *err;
     else if (!n->thing)
         gon_fail(&n->err, GON_E_SYSTEM, "store: out of memory");
+    else
+        ((struct run *)n->thing)->left_s = catalog_left_s(entry, s->links.bench);
     note_post(s->links.to_main, n);
 }
 
@@ -407,6 +432,7 @@ void storer_step(struct storer *s, struct note *n)
     case NOTE_STATE: append_state(s, n, NULL); break;
     case NOTE_FIT: append_fit(s, n); break;
     case NOTE_CLOSE: close_run(s, n); break;
+    case NOTE_QUEUE: keep_queue(s, n); break;
     default: break;
     }
     note_free(n);
@@ -437,6 +463,7 @@ int storer_start(const struct storer_links *links, struct storer **ret_storer,
         storer_free(s);
         return gon_fail(err, GON_E_SYSTEM, "store thread: %s", strerror(failed));
     }
+    (void)pthread_setname_np(s->thread, "store"); // for top -H and debuggers
     *ret_storer = s;
     return GON_OK;
 }

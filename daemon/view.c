@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { VIEW_QUEUE = 1000 };
+
 json_t *view_number(double value)
 {
     return isfinite(value) ? json_real(value) : json_null();
@@ -31,6 +33,43 @@ json_t *view_run(const struct run *run, bool with_fit)
         json_object_set_new(o, "fit", fit ? fit : json_null());
     }
     return o;
+}
+
+static json_t *entry_view(const struct queue_entry *e, size_t place)
+{
+    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:i, s:b, s:b}", "run", e->run->id, "name",
+                          e->run->name, "sample", e->run->sample, "state",
+                          run_state_name(e->run->state), "place", (int)place, "active", e->active,
+                          "held", e->run->held);
+    json_object_set_new(o, "left_s", view_number(e->run->left_s));
+    return o;
+}
+
+json_t *view_queue(const struct queue *q)
+{
+    struct queue_entry entries[VIEW_QUEUE];
+    const size_t count = queue_entries(q, entries, VIEW_QUEUE);
+    const size_t first = count && entries[0].active ? 0 : 1; // place 0 has the bench
+    double ready_s = 0.0;
+    json_t *all = json_array();
+    for (size_t i = 0; i < count; i++) {
+        const bool waits = !entries[i].active && (queue_is_held(q) || entries[i].run->held);
+        json_t *o = entry_view(&entries[i], first + i);
+        if (!waits)
+            ready_s += entries[i].run->left_s;
+        json_object_set_new(o, "ready_s", waits ? json_null() : view_number(ready_s));
+        json_array_append_new(all, o);
+    }
+    return json_pack("{s:b, s:o, s:o}", "held", queue_is_held(q), "left_s", view_number(ready_s),
+                     "entries", all);
+}
+
+json_t *view_control(const struct control *c)
+{
+    if (!control_taken(c))
+        return json_null();
+    return json_pack("{s:s, s:s, s:I}", "name", c->name, "reason", c->reason, "since_utc_ms",
+                     (json_int_t)c->since_utc_ms);
 }
 
 json_t *view_flags(unsigned flags)

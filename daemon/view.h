@@ -2,6 +2,7 @@
 // What the daemon knows, as JSON: the resources of /api/v1 and the events of its stream share
 // these. A number that is not known is null. The caller owns what is returned; NULL without memory.
 #pragma once
+#include "daemon/control.h"
 #include "daemon/instrument.h"
 #include "daemon/queue.h"
 
@@ -13,6 +14,14 @@ json_t *view_number(double value); // null unless finite
 //  "theta_i_deg", "theta_r_deg", "f_r_per_sr", "u_f_r_per_sr", "flags", "left_s", "emission"};
 // with_fit adds "fit".
 json_t *view_run(const struct run *run, bool with_fit);
+
+// {"held", "left_s", "entries": [{"run", "name", "sample", "place", "active", "held", "left_s",
+// "ready_s"}]}: place 0 is the run that has the bench; ready_s: until it is done, by the estimates
+// and the order, null of one that is held or when it is not known.
+json_t *view_queue(const struct queue *q);
+
+// {"name", "reason", "since_utc_ms"}; null: nobody has control
+json_t *view_control(const struct control *c);
 
 // [{"name", "link", "address", "identity", "problem", "errors", "returns", then what belongs to
 // it}]; of an axis "unit", "position", "target" (user), "dial", "raw_steps", "moving", "homed",

@@ -67,11 +67,26 @@ static void changed(void *ctx, const struct run *run)
     say("%d=%s%s%s; ", run->id, names[run->state], *run->text ? ":" : "", run->text);
 }
 
+static char kept[200]; // the queue as it was last kept
+
+static void keep(void *ctx)
+{
+    struct queue **q = ctx;
+    struct queue_entry e[8];
+    const size_t count = queue_entries(*q, e, 8);
+    size_t n = 0;
+    *kept = 0;
+    for (size_t i = 0; i < count; i++)
+        n += (size_t)snprintf(kept + n, sizeof kept - n, "%s%d%s", e[i].active ? "*" : "",
+                              e[i].run->id, e[i].run->held ? "h " : " ");
+}
+
 static struct queue *make(int runs)
 {
-    struct queue_ports ports = {NULL,      open_run, start_run, fit_run_,
-                                close_run, cancel,   rearm,     changed};
-    struct queue *q = queue_new(&ports);
+    static struct queue *made;
+    struct queue_ports ports = {&made,  open_run, start_run, fit_run_, close_run,
+                                cancel, rearm,    changed,   keep};
+    struct queue *q = made = queue_new(&ports);
     for (int id = runs; id >= 1; id--)
         queue_know(q, &(struct run){.id = id, .state = RUN_STOPPED, .left_s = (double)NAN});
     *said = 0;
@@ -247,9 +262,109 @@ static void a_failed_fit_is_remembered_until_a_later_one_succeeds(void **state)
     queue_free(q);
 }
 
+#define KEPT(text) assert_string_equal(kept, text)
+
+static void the_order_can_be_changed(void **state)
+{
+    (void)state;
+    struct gon_error err;
+    struct queue *q = make(5);
+    measure(q, 3);
+    for (int id = 1; id <= 5; id++)
+        if (id != 3)
+            assert_int_equal(queue_submit(q, id, NULL), 0);
+    KEPT("*3 1 2 4 5 ");
+    assert_int_equal(queue_move(q, 5, 1, NULL), 0);
+    KEPT("*3 5 1 2 4 ");
+    assert_int_equal(queue_move(q, 5, 4, NULL), 0);
+    KEPT("*3 1 2 4 5 ");
+    *said = 0;
+    assert_int_equal(queue_remove(q, 2, "uid 7", NULL), 0);
+    EXPECT("2=stopped:taken out of the queue by uid 7; ");
+    KEPT("*3 1 4 5 ");
+    assert_int_equal(queue_move(q, 5, 0, &err), GON_E_INPUT);
+    assert_int_equal(queue_move(q, 5, 4, &err), GON_E_INPUT);
+    assert_string_equal(err.text, "place 4: the queue has 1 to 3");
+    assert_int_equal(queue_move(q, 3, 1, &err), GON_E_INPUT); // it has the bench
+    assert_string_equal(err.text, "run 3 does not wait in the queue; see: gonio queue");
+    assert_int_equal(queue_remove(q, 2, "x", &err), GON_E_INPUT);
+    assert_int_equal(queue_hold(q, 3, true, &err), GON_E_INPUT);
+    KEPT("*3 1 4 5 ");
+    queue_free(q);
+}
+
+static void what_is_held_is_passed(void **state)
+{
+    (void)state;
+    struct queue *q = make(4);
+    assert_int_equal(queue_hold(q, 0, true, NULL), 0);
+    for (int id = 1; id <= 3; id++)
+        queue_submit(q, id, NULL);
+    EXPECT("1=queued; 2=queued; 3=queued; "); // nothing is opened
+    assert_int_equal(queue_hold(q, 1, true, NULL), 0);
+    KEPT("1h 2 3 ");
+    assert_int_equal(queue_hold(q, 0, false, NULL), 0);
+    EXPECT("open 2; ");
+    KEPT("*2 1h 3 ");
+    queue_opened(q, 2, NULL, NULL);
+    EXPECT("2=failed; open 3; ");
+    queue_opened(q, 3, NULL, NULL);
+    EXPECT("3=failed; ");
+    KEPT("1h ");
+    assert_int_equal(queue_hold(q, 1, false, NULL), 0);
+    EXPECT("open 1; ");
+    queue_free(q);
+}
+
+static void the_queue_of_an_earlier_life_waits(void **state)
+{
+    (void)state;
+    struct queue *q = make(4);
+    queue_know(q, &(struct run){.id = 2, .state = RUN_DONE});
+    *said = *kept = 0;
+    queue_restore(q, 3, false); // had the bench
+    queue_restore(q, 2, false); // was done before the daemon died
+    queue_restore(q, 1, true);
+    queue_restore(q, 9, false); // its file is gone
+    EXPECT(""); // stopped, as they were
+    assert_true(queue_is_held(q));
+    assert_null(queue_active(q));
+    queue_hold(q, 0, false, NULL);
+    EXPECT("3=queued; 1=queued; open 3; ");
+    KEPT("*3 1h ");
+    queue_free(q);
+}
+
+static void the_end_of_the_daemon_leaves_the_queue_as_it_was(void **state)
+{
+    (void)state;
+    struct queue *q = make(4);
+    measure(q, 3);
+    queue_submit(q, 1, NULL);
+    KEPT("*3 1 ");
+    queue_end(q);
+    queue_ended(q, 3, RUN_STOPPED, NULL);
+    queue_closed(q, 3, NULL);
+    assert_true(queue_idle(q));
+    KEPT("*3 1 ");
+    queue_free(q);
+    q = make(4);
+    measure(q, 3);
+    queue_stop(q, "stopped"); // but a stop is one
+    KEPT("*3 ");
+    queue_ended(q, 3, RUN_STOPPED, NULL);
+    queue_closed(q, 3, NULL);
+    KEPT("");
+    queue_free(q);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_order_can_be_changed),
+        cmocka_unit_test(what_is_held_is_passed),
+        cmocka_unit_test(the_queue_of_an_earlier_life_waits),
+        cmocka_unit_test(the_end_of_the_daemon_leaves_the_queue_as_it_was),
         cmocka_unit_test(a_run_is_done_after_its_last_fit_is_stored),
         cmocka_unit_test(runs_wait_for_each_other),
         cmocka_unit_test(what_cannot_be_queued_is_refused),

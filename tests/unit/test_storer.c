@@ -12,6 +12,7 @@
 #include "base/units.h"
 #include "campaign/bench.h"
 #include "campaign/reduce.h"
+#include "campaign/state.h"
 #include "campaign/store.h"
 #include "model/brdf.h"
 
@@ -303,11 +304,66 @@ static void campaigns_are_listed_with_their_states(void **state)
         assert_int_equal(run->state, wanted[i]);
         note_free(n);
     }
+    struct note *queue = expect(w->to_main, NOTE_RESTORED);
+    assert_int_equal(((const struct state_queue *)queue->thing)->count, 0);
+    note_free(queue);
     struct note *end = expect(w->to_main, NOTE_LISTED);
     assert_null(end->thing);
     note_free(end);
     free(a);
     free(b);
+}
+
+// What another storer on the same folder, later, says was queued.
+static void the_queue_outlives_the_storer(void **state)
+{
+    struct world *w = *state;
+    struct run *a = create(w), *b = create(w);
+    assert_true(a->left_s > 0); // the estimate of the plan
+    storer_step(w->storer, note_of(NOTE_LIST, 0, NULL, NULL));
+    for (int i = 0; i < 4; i++)
+        note_free(note_take(w->to_main));
+    struct note *n = note_of(NOTE_QUEUE, 0, NULL, NULL);
+    struct state_queue *q = state_queue_new(2);
+    q->entries[0] = (struct state_entry){.run = b->id, .active = true};
+    q->entries[1] = (struct state_entry){.run = a->id, .held = true};
+    n->thing = q;
+    storer_step(w->storer, n);
+    assert_null(note_take(w->to_main)); // kept
+    storer_free(w->storer);
+    w->storer = storer_new(&w->links);
+    storer_step(w->storer, note_of(NOTE_LIST, 0, NULL, NULL));
+    for (int i = 0; i < 2; i++) {
+        n = expect(w->to_main, NOTE_LISTED);
+        assert_true(((const struct run *)n->thing)->left_s > 0);
+        note_free(n);
+    }
+    n = expect(w->to_main, NOTE_RESTORED);
+    q = n->thing;
+    assert_int_equal(q->count, 2);
+    assert_true(q->entries[0].run == b->id && q->entries[0].active && !q->entries[0].held);
+    assert_true(q->entries[1].run == a->id && !q->entries[1].active && q->entries[1].held);
+    note_free(n);
+    note_free(expect(w->to_main, NOTE_LISTED));
+    free(a);
+    free(b);
+}
+
+static void another_daemons_folder_is_refused(void **state)
+{
+    struct world *w = *state;
+    storer_step(w->storer, note_of(NOTE_LIST, 0, NULL, NULL));
+    note_free(expect(w->to_main, NOTE_RESTORED));
+    note_free(expect(w->to_main, NOTE_LISTED));
+    struct storer *second = storer_new(&w->links);
+    storer_step(second, note_of(NOTE_LIST, 0, NULL, NULL));
+    struct note *n = expect(w->to_main, NOTE_UNKEPT);
+    char wanted[60];
+    snprintf(wanted, sizeof wanted, "state.db: in use by process %d", (int)getpid());
+    assert_int_equal(n->err.code, GON_E_REFUSED);
+    assert_non_null(strstr(n->err.text, wanted));
+    note_free(n);
+    storer_free(second);
 }
 
 static void only_files_of_the_own_folder_are_taken(void **state)
@@ -415,6 +471,7 @@ static void a_number_is_given_once_in_the_daemons_life(void **state)
     assert_int_equal(rename(second->path, listed), 0);
     storer_step(w->storer, note_of(NOTE_LIST, 0, NULL, NULL));
     note_free(expect(w->to_main, NOTE_LISTED));
+    note_free(expect(w->to_main, NOTE_RESTORED));
     note_free(expect(w->to_main, NOTE_LISTED));
     unlink(listed);
     struct run *third = create(w);
@@ -500,6 +557,8 @@ int main(void)
         TEST(a_wrong_campaign_is_complained_of_line_by_line),
         TEST(another_bench_is_refused),
         TEST(campaigns_are_listed_with_their_states),
+        TEST(the_queue_outlives_the_storer),
+        TEST(another_daemons_folder_is_refused),
         TEST(only_files_of_the_own_folder_are_taken),
         TEST(a_number_is_looked_for_in_the_folder),
         TEST(what_cannot_go_on_is_seen_at_once),
