@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A profile against the bytes that a manual or public source shows (struct profile_golden), through
+// A profile against the bytes that a source or recording shows (struct profile_golden), through
 // the code that talks to instruments: session, message, and for Modbus bus and libmodbus RTU, over
 // a pseudo-terminal. What is sent must be the bytes shown, one by one; what is answered must be
 // read as the entry says. Waits, gaps and read-backs are left out: they are not what is shown.
