@@ -253,10 +253,15 @@ static void run_session(struct record *r, struct recorder *recorder, const struc
     *status = worse(*status, tell(rc, &err));
     if (rc == 0)
         fprintf(stderr, "%s: %s\n", r->link, who);
-    if (is_over(rc))
-        return;
-    if (o->interactive) {
+    if (o->interactive && !is_over(rc))
         run_lines(r, recorder, i, status);
+    if (o->interactive)
+        return;
+    // What is a question to one instrument may be a command to another.
+    if (rc < 0) {
+        if (!is_over(rc))
+            out_say("profile record: it is not known who that is, so nothing else is asked; "
+                    "--interactive asks whatever is wanted");
         return;
     }
     rc = recorder_ask_all(recorder, &err);

@@ -112,6 +112,10 @@ static void comment(struct recorder *r, const char *fmt, ...)
     va_start(args, fmt);
     vsnprintf(text, sizeof text, fmt, args);
     va_end(args);
+    // What an error quotes of an answer may be any bytes.
+    for (char *c = text; *c; c++)
+        if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
+            *c = '?';
     r->sink.take(r->sink.ctx, NULL, text);
 }
 
