@@ -79,8 +79,12 @@ static bool cut_begin(struct golden_bytes *b, const char *text)
 static int copy_text(const struct golden_bytes *b, char ret_text[PROFILE_LONG],
                      struct gon_error *err)
 {
-    if (b->size >= PROFILE_LONG || memchr(b->byte, 0, b->size))
-        return gon_fail(err, GON_E_INPUT, "too long for an entry, or with a zero byte in it");
+    if (b->size >= PROFILE_LONG)
+        return gon_fail(err, GON_E_INPUT, "too long for an entry");
+    for (size_t i = 0; i < b->size; i++) // profiles are UTF-8, and their texts end with zero
+        if (b->byte[i] == 0 || b->byte[i] >= 0x80)
+            return gon_fail(err, GON_E_INPUT, "byte %02X cannot be written in a profile",
+                            b->byte[i]);
     memcpy(ret_text, b->byte, b->size);
     ret_text[b->size] = 0;
     return 0;
