@@ -39,6 +39,7 @@ static const struct option_row all_options[] = {
      "something; 'NAME: a = 1, b = 2' gives it values; may be repeated"},
     {"--interactive", OPTION_FLAG, 0, NULL, 0, 0,
      "record: instead of asking everything run lines from standard input"},
+    {"--json", OPTION_FLAG, 0, NULL, 0, 0, "check, list: all of it as JSON"},
     VERB_OPTIONS_END};
 
 const struct verb verb_profile = {
@@ -54,6 +55,6 @@ const struct verb verb_profile = {
     "switches emission on. settings prints what a profile may say. sim serves the instrument on a "
     "pty and on TCP, and says how to reach it: to try a script, or a bench before the instrument "
     "is there; Ctrl-C ends it. Of the options --run-dir and --fast are sim's, --unit is sim's and "
-    "record's, and the others are record's.\n",
+    "record's, --json is check's and list's, the others are record's.\n",
     all_options,
     run_profile};
