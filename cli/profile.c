@@ -10,8 +10,12 @@
 static const struct {
     const char *word;
     int (*run)(int argc, char **argv);
-} words[] = {{"check", profile_check_files}, {"doc", profile_doc},           {"list", profile_list},
-             {"sim", profile_sim},           {"settings", profile_settings}, {"record", profile_record},
+} words[] = {{"check", profile_check_files},
+             {"doc", profile_doc},
+             {"list", profile_list},
+             {"sim", profile_sim},
+             {"settings", profile_settings},
+             {"record", profile_record},
              {NULL, NULL}};
 
 static int run_profile(const struct verb *verb, int argc, char **argv)

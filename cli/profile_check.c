@@ -167,9 +167,9 @@ static void add_line(void *ctx, const char *line)
 
 static void add_failure(void *ctx, const struct profile *p, int entry, const char *text)
 {
-    json_array_append_new(ctx, json_pack("{s:i, s:s, s:o}", "entry", entry, "does",
-                                         entry_name(&p->golden[entry]), "text",
-                                         out_json_text(text)));
+    json_array_append_new(ctx,
+                          json_pack("{s:i, s:s, s:o}", "entry", entry, "does",
+                                    entry_name(&p->golden[entry]), "text", out_json_text(text)));
 }
 
 static json_t *requests_of(const struct profile *p, int *ret_wrong)
@@ -216,14 +216,14 @@ static void describe(json_t *o, const struct profile *p)
 // All members are there, whatever is wrong; null is what is not known of a file with mistakes.
 static json_t *json_one(const char *name)
 {
-    static const char *const unknown[] = {"name",   "title",  "role",       "protocol", "values",
-                                          "exchanges", "writes", "golden", "unverified", "requests",
-                                          "requests_wrong"};
+    static const char *const unknown[] = {"name",       "title",     "role",          "protocol",
+                                          "values",     "exchanges", "writes",        "golden",
+                                          "unverified", "requests",  "requests_wrong"};
     char path[PATH_MAX] = "";
     json_t *mistakes = json_array();
     struct profile *p = take(name, (struct cfg_sink){add_line, mistakes}, path, sizeof path);
-    json_t *o = json_pack("{s:o, s:b, s:o}", "file", out_json_text(*path ? path : name), "well",
-                          0, "mistakes", mistakes);
+    json_t *o = json_pack("{s:o, s:b, s:o}", "file", out_json_text(*path ? path : name), "well", 0,
+                          "mistakes", mistakes);
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++)
         json_object_set_new(o, unknown[i], json_null());
     if (p)

@@ -66,8 +66,11 @@ static void print_bits(FILE *out, const struct profile_value *v)
 {
     for (int i = 0; i < v->bits_count; i++) {
         const struct profile_bit *b = &v->bits[i];
-        fprintf(out, "%sbit %d %s%s", i ? ", " : *v->help ? " " : "", b->bit, b->name,
-                *b->help ? " (" : "");
+        fprintf(out, "%sbit %d %s%s",
+                i          ? ", "
+                : *v->help ? " "
+                           : "",
+                b->bit, b->name, *b->help ? " (" : "");
         cell(out, b->help);
         fprintf(out, "%s", *b->help ? ")" : "");
     }

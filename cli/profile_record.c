@@ -56,8 +56,8 @@ static const struct verb verb = {
 
 struct record {
     const struct profile *p;
-    FILE *out, *notes;  // notes: comments until it is known whether an entry follows
-    char *note;         // of notes
+    FILE *out, *notes; // notes: comments until it is known whether an entry follows
+    char *note;        // of notes
     size_t note_size;
     const char *link;
     bool into_list; // the profile has a golden list: what is written is pasted into it
@@ -244,8 +244,7 @@ static void run_lines(struct record *r, struct recorder *recorder, const struct 
 }
 
 static void run_session(struct record *r, struct recorder *recorder, const struct options *o,
-                        const char *const *steps, int count, const struct interrupt *i,
-                        int *status)
+                        const char *const *steps, int count, const struct interrupt *i, int *status)
 {
     struct gon_error err = {0};
     char who[400];

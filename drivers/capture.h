@@ -19,5 +19,5 @@ struct capture {
     int lost;                  // exchanges that found no room
 };
 
-void capture_begin(struct capture *c);   // also to begin anew
-void capture_forget(struct capture *c);  // what was captured so far; the tap stays
+void capture_begin(struct capture *c);  // also to begin anew
+void capture_forget(struct capture *c); // what was captured so far; the tap stays

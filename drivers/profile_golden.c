@@ -96,7 +96,8 @@ int profile_golden_with(const struct profile *p, const char *text, struct profil
         const struct profile_token sign = profile_token_next(&at), right = profile_token_next(&at);
         const int value = profile_value(p, name.text);
         double number;
-        if (!profile_token_is(&sign, "=") || strlen(name.text) >= PROFILE_NAME || count == COUNT_MOST ||
+        if (!profile_token_is(&sign, "=") || strlen(name.text) >= PROFILE_NAME ||
+            count == COUNT_MOST ||
             profile_literal(value < 0 ? NULL : &p->values[value], right.text, &number, NULL) < 0)
             return gon_fail(err, GON_E_INPUT, "with: '%.80s' is not NAME = NUMBER, ...", text);
         if (value >= 0)

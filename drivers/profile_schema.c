@@ -261,7 +261,8 @@ static const struct cfg_row golden_rows[] = {
           "The bytes without terminator; Modbus: an RTU frame in hexadecimal."),
     BYTES(profile_golden, "received", received, "", "The answer, in the same form."),
     TEXT(profile_golden, "gives", gives, "", "What is read from it: \"x = 0.951359\"."),
-    TEXT(profile_golden, "source", source, NULL, "Manual and page, or public code, that shows it; or that it was recorded, and from what."),
+    TEXT(profile_golden, "source", source, NULL,
+         "Manual and page, or public code, that shows it; or that it was recorded, and from what."),
     {0}};
 
 // --- roles ---------------------------------------------------------------------------------------

@@ -50,8 +50,7 @@ static int parse_setting(const struct profile *p, const char *line, struct recor
                          struct gon_error *err)
 {
     char name[PROFILE_NAME];
-    const int value =
-        take_name(line, strcspn(line, "="), name) ? profile_value(p, name) : -1;
+    const int value = take_name(line, strcspn(line, "="), name) ? profile_value(p, name) : -1;
     if (value < 0)
         return gon_fail(err, GON_E_INPUT, "profile %s has no value '%.*s'", p->name,
                         (int)strcspn(line, "="), line);
@@ -90,7 +89,7 @@ static int parse_names(const struct profile *p, const char *line, struct record_
 }
 
 int record_step_parse(const struct profile *p, const char *line, struct record_step *ret_step,
-                 struct gon_error *err)
+                      struct gon_error *err)
 {
     struct record_step step = {.with = ""};
     const size_t colon = strcspn(line, ":="); // a text in a value may hold a colon
@@ -110,12 +109,12 @@ int record_step_parse(const struct profile *p, const char *line, struct record_s
     return rc;
 }
 
-int record_step_with(const struct profile *p, const struct record_step *step, struct profile_data *d,
-                     struct golden_params *ret_params, struct gon_error *err)
+int record_step_with(const struct profile *p, const struct record_step *step,
+                     struct profile_data *d, struct golden_params *ret_params,
+                     struct gon_error *err)
 {
-    return p->protocol == PROFILE_MODBUS
-               ? profile_golden_with(p, step->with, d, ret_params, err)
-               : profile_assign_data(p, step->with, NULL, d, err);
+    return p->protocol == PROFILE_MODBUS ? profile_golden_with(p, step->with, d, ret_params, err)
+                                         : profile_assign_data(p, step->with, NULL, d, err);
 }
 
 int record_step_may(const struct profile *p, const struct record_step *step, struct gon_error *err)

@@ -73,7 +73,7 @@ int recorder_open(const struct profile *p, const char *link, int unit, struct cl
     struct recorder *r = calloc(1, sizeof *r);
     if (!r)
         return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
-    const enum golden_wire wire = p->protocol == PROFILE_MESSAGE        ? GOLDEN_MESSAGE
+    const enum golden_wire wire = p->protocol == PROFILE_MESSAGE          ? GOLDEN_MESSAGE
                                   : strncmp(link, "modbus-tcp:", 11) == 0 ? GOLDEN_TCP
                                                                           : GOLDEN_RTU;
     r->p = p;
@@ -209,8 +209,9 @@ static bool flush(struct recorder *r, const struct record_step *step, const stru
 }
 
 // What became of a step: rc of the session, or that no entry came of it.
-static int conclude(struct recorder *r, const struct record_step *step, const struct profile_data *d,
-                    int rc, const struct gon_error *why, struct gon_error *err)
+static int conclude(struct recorder *r, const struct record_step *step,
+                    const struct profile_data *d, int rc, const struct gon_error *why,
+                    struct gon_error *err)
 {
     const char *name = step->asks.count ? step->asks.name[0] : step->does;
     const bool wanted = flush(r, step, d);

@@ -26,10 +26,10 @@ int recorder_open(const struct profile *p, const char *link, int unit, struct cl
 void recorder_close(struct recorder *r);
 
 // A line says what to do:
-//   NAME, NAME             exchanges of a message instrument, values of a Modbus one: they are asked
-//   VALUE = NUMBER         what sets that value is sent with it, then what reads it back
-//   NAME                   an exchange or write that does something
-//   NAME: A = 1, B = 2     the same with its values and $NAMEs
+//   NAME, NAME             exchanges of a message instrument, values of a Modbus one: they are
+//   asked VALUE = NUMBER         what sets that value is sent with it, then what reads it back NAME
+//   an exchange or write that does something NAME: A = 1, B = 2     the same with its values and
+//   $NAMEs
 // 0; GON_E_INPUT: no such thing, or a value that cannot be; GON_E_REFUSED: it would switch light
 // on. Sends nothing.
 int recorder_may(const struct profile *p, const char *line, struct gon_error *err);

@@ -3,6 +3,7 @@
 the profile, and gonio profile check passes; and everything that can go wrong on the way."""
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -12,6 +13,7 @@ import time
 import pytest
 
 from conftest import BUILD, PATIENCE_S, ROOT, gonio, wait_for
+from test_usbtmc import Usb, preload
 
 PROFILES = sorted((ROOT / "configs" / "profiles").glob("*.cfg"))
 
@@ -121,6 +123,36 @@ def test_a_tampered_frame_is_found(start_sim, tmp_path):
     bad = pasted(profile, r.stdout.replace("07 03 00 CC", "07 03 00 CD"), tmp_path / "bad")
     check = gonio("profile", "check", bad)
     assert check.returncode == 2 and re.search(r"got 07 03 00 CC .* / expected 07 03 00 CD .* / at byte 3\n", check.stderr)
+
+
+USB_METER = r"""
+profile: { name = "usb-meter"; title = "A USB meter"; role = "inputs"; protocol = "message"; source = "this test"; };
+values: ( { name = "model"; type = "string"; }, { name = "serial"; type = "string"; }, { name = "power_w"; unit = "W"; } );
+framing: { end_out = "\n"; end_in = "\n"; };
+exchanges: ( { name = "identity"; send = "*IDN?"; answer = "Thorlabs,{model},{serial},{}"; },
+             { name = "power"; send = "MEAS:POW?"; answer = "{power_w}"; } );
+identify: { asks = ( "identity" ); title = "Thorlabs {model}, serial {serial}"; };
+inputs: { status = ( "power" ); };
+"""
+
+
+@pytest.mark.skipif(not shutil.which("umockdev-wrapper") or not (BUILD / "tests/usbsim").exists(),
+                    reason="umockdev is not installed")
+def test_a_usb_instrument_is_recorded(tmp_path):
+    meter = written(tmp_path, USB_METER, "usb-meter")
+    usb = Usb(tmp_path)
+    try:
+        usb.tell("plug 0 1 2")
+        env = {"LD_PRELOAD": preload(BUILD / "gonio"), **usb.env}
+        r = gonio("profile", "record", meter, "usbtmc:1313:8072", env=env)
+    finally:
+        usb.close()
+    assert r.returncode == 0, r.stderr
+    assert "  # *IDN?\\n -> Thorlabs,PM100USB,P0000001,1.4.0\\n\n" in r.stdout
+    assert 'from Thorlabs PM100USB, serial P0000001"' in r.stdout
+    assert re.search(r'does = "power"; sent = "MEAS:POW\?"; received = "[^"]+";\n    gives = "power_w = ', r.stdout)
+    check = gonio("profile", "check", pasted(meter, r.stdout, tmp_path / "p"))
+    assert check.returncode == 0, check.stderr
 
 
 # --- setting and doing ------------------------------------------------------------------------------

@@ -19,19 +19,19 @@
     "profile: { name = \"t\"; title = \"T\"; role = \"inputs\"; source = \"invented\"; protocol "  \
     "= "
 
-static const char plain[] =
-    ABOUT "\"message\"; };"
-          "values: ( { name = \"x\"; over = [ 9.9e37 ]; }, { name = \"h\"; type = \"hex\"; },"
-          "  { name = \"w\"; type = \"word\"; words = ( \"ON\", \"SHUTTER OPEN\" ); },"
-          "  { name = \"model\"; type = \"string\"; },"
-          "  { name = \"doubt\"; valid = \"x = 1\"; } );"
-          "framing: { end_out = \"\\r\"; end_in = \"\\r\\n\"; };"
-          "exchanges: ( { name = \"model\"; send = \"m?\"; answer = \"{model}\"; },"
-          "  { name = \"set\"; send = \"x {x:.2f}\"; answer = \"OK\"; },"
-          "  { name = \"x\"; send = \"x?\"; answer = \"{x} V\"; }, { name = \"go\"; send = \"g\"; },"
-          "  { name = \"all\"; send = \"a?\"; answer = \"{x},{h},{w},{doubt}\"; } );"
-          "refusals: ( { like = \"error*\"; } );"
-          "inputs: { status = ( \"x\" ); };";
+static const char plain[] = ABOUT
+    "\"message\"; };"
+    "values: ( { name = \"x\"; over = [ 9.9e37 ]; }, { name = \"h\"; type = \"hex\"; },"
+    "  { name = \"w\"; type = \"word\"; words = ( \"ON\", \"SHUTTER OPEN\" ); },"
+    "  { name = \"model\"; type = \"string\"; },"
+    "  { name = \"doubt\"; valid = \"x = 1\"; } );"
+    "framing: { end_out = \"\\r\"; end_in = \"\\r\\n\"; };"
+    "exchanges: ( { name = \"model\"; send = \"m?\"; answer = \"{model}\"; },"
+    "  { name = \"set\"; send = \"x {x:.2f}\"; answer = \"OK\"; },"
+    "  { name = \"x\"; send = \"x?\"; answer = \"{x} V\"; }, { name = \"go\"; send = \"g\"; },"
+    "  { name = \"all\"; send = \"a?\"; answer = \"{x},{h},{w},{doubt}\"; } );"
+    "refusals: ( { like = \"error*\"; } );"
+    "inputs: { status = ( \"x\" ); };";
 
 static const char echoes[] =
     ABOUT "\"message\"; };"
@@ -50,15 +50,14 @@ static const char summed[] =
           "refusals: ( { like = \"err*\"; } );"
           "inputs: { status = ( \"x\" ); };";
 
-static const char modbus[] =
-    ABOUT "\"modbus\"; };"
-          "values: ( { name = \"a\"; type = \"int\"; address = 0x10; },"
-          "  { name = \"b\"; type = \"int\"; address = 0x11; },"
-          "  { name = \"input\"; type = \"hex\"; address = 0x7d;"
-          "    bits = ( { bit = 5; name = \"stop\"; } ); } );"
-          "writes: ( { name = \"move\"; set = ( \"a\", \"b = 1\" ); },"
-          "  { name = \"stop\"; edge = \"input.stop\"; } );"
-          "inputs: { status = ( \"input\" ); };";
+static const char modbus[] = ABOUT "\"modbus\"; };"
+                                   "values: ( { name = \"a\"; type = \"int\"; address = 0x10; },"
+                                   "  { name = \"b\"; type = \"int\"; address = 0x11; },"
+                                   "  { name = \"input\"; type = \"hex\"; address = 0x7d;"
+                                   "    bits = ( { bit = 5; name = \"stop\"; } ); } );"
+                                   "writes: ( { name = \"move\"; set = ( \"a\", \"b = 1\" ); },"
+                                   "  { name = \"stop\"; edge = \"input.stop\"; } );"
+                                   "inputs: { status = ( \"input\" ); };";
 
 static void hear(void *ctx, const char *line)
 {
@@ -230,8 +229,8 @@ static void what_is_no_exchange_becomes_none(void **state)
 
 static void frames_become_entries(void **state)
 {
-    struct made m = make(modbus, GOLDEN_RTU, "07 03 00 7D 00 01 14 74", "07 03 02 00 20 31 9C", "",
-                         "");
+    struct made m =
+        make(modbus, GOLDEN_RTU, "07 03 00 7D 00 01 14 74", "07 03 02 00 20 31 9C", "", "");
     (void)state;
     assert_int_equal(m.rc, 0);
     assert_int_equal(m.g.asks_count, 1);
@@ -286,7 +285,8 @@ static void frames_that_are_none_become_none(void **state)
     }
 }
 
-// --- what a profile may be told --------------------------------------------------------------------
+// --- what a profile may be told
+// --------------------------------------------------------------------
 
 static void a_setter_needs_fewest_others(void **state)
 {

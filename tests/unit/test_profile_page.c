@@ -45,7 +45,8 @@ static const char lines[] =
     "  power = \"w\"; setpoint = \"w\"; fault = \"lit\"; set_power = \"set\"; power_most_w = 2;"
     "  before_on = ( \"w\" ); may_not = ( { when = \"w = 2\"; is = \"key\"; text = \"t\"; } );"
     "  prepare = ( { when = \"w = 1\"; send = \"set\"; } ); on = ( { send = \"on\"; } );"
-    "  after_refusal = ( \"w\" ); refusals = ( { when = \"w = 1\"; is = \"fault\"; text = \"t\"; } );"
+    "  after_refusal = ( \"w\" ); refusals = ( { when = \"w = 1\"; is = \"fault\"; text = \"t\"; } "
+    ");"
     "  off = ( \"\\rl0\" ); off_asks = ( \"lit\" ); is_off = \"lit = 0\";"
     "  faults = ( { code = 1; text = \"f\"; means = \"fault\"; } );"
     "  keepalive = { send = \"keep\"; period_ms = 300; }; };";
@@ -60,12 +61,15 @@ static const char registers[] =
     "  { name = \"b\"; type = \"int\"; table = \"coil\"; address = 3; max = 1; },"
     "  { name = \"c\"; type = \"hex\"; address = 0x20; shares = \"d\"; access = \"w\";"
     "    bits = ( { name = \"x\"; bit = 3; help = \"h\"; } ); },"
-    "  { name = \"d\"; type = \"int\"; address = 0x20; words = ( \"p\", \"q\" ); ladder_first = 1; } );"
+    "  { name = \"d\"; type = \"int\"; address = 0x20; words = ( \"p\", \"q\" ); ladder_first = 1; "
+    "} );"
     "writes: ( { name = \"set\"; set = ( \"b = 1\" ); readback = true; verify = \"b = 1\";"
     "    repeat = true; then = \"b = 1\"; help = \"h\"; },"
-    "  { name = \"edge\"; edge = \"c.x\"; release = \"free\"; }, { name = \"free\"; set = ( \"c = 0\" ); } );"
+    "  { name = \"edge\"; edge = \"c.x\"; release = \"free\"; }, { name = \"free\"; set = ( \"c = "
+    "0\" ); } );"
     "inputs: { status = ( \"a\", \"b\" ); watchdog = \"set\"; watchdog_ms = 400; };"
-    "golden: ( { asks = ( \"b\" ); unit = 3; sent = \"03 01\"; received = \"03 81\"; source = \"s\"; } );";
+    "golden: ( { asks = ( \"b\" ); unit = 3; sent = \"03 01\"; received = \"03 81\"; source = "
+    "\"s\"; } );";
 
 static const char axis[] =
     "profile: { name = \"a\"; title = \"A\"; role = \"axis\"; protocol = \"modbus\";"
@@ -230,7 +234,8 @@ static void visit(struct walk *w, const struct cfg_row *rows, char *at, const ch
 // Groups that are of no use to this profile hold defaults only, if anything.
 static bool is_of_use(const struct profile *p, const char *group)
 {
-    static const char *const messages[] = {"framing", "checksum", "exchanges", "refusals", "errors"};
+    static const char *const messages[] = {"framing", "checksum", "exchanges", "refusals",
+                                           "errors"};
     const bool modbus = p->protocol == PROFILE_MODBUS;
     for (size_t i = 0; i < sizeof messages / sizeof *messages; i++)
         if (strcmp(group, messages[i]) == 0)
