@@ -327,6 +327,21 @@ def test_a_retry_loses_nothing(tmp_path):
     assert 'does = "x"; sent = "X?"; received = "1.500 V";' in r.stdout
 
 
+def test_an_answer_that_comes_too_late_is_seen(tmp_path):
+    meter = written(tmp_path, METER.replace("timeout_ms = 100; quiet_ms = 100", "timeout_ms = 500; quiet_ms = 1000"))
+    late = iter([b"1.400 V\r\n"])
+
+    def answer():
+        said = next(late, None)
+        if said:
+            time.sleep(0.9)  # after its 500 ms, and before the line was silent for 1000 ms
+        return said or b"1.500 V\r\n"
+
+    r = gonio("profile", "record", meter, Instrument({**GOOD, b"X?": answer}).link)
+    assert r.returncode == 0, r.stderr
+    assert "  # X?\\r -> 1.400 V\\r\\n\n" in r.stdout and "  # X?\\r -> 1.500 V\\r\\n\n" in r.stdout
+
+
 def test_an_error_reply_is_an_entry(tmp_path):
     meter = written(tmp_path)
     r = gonio("profile", "record", meter, Instrument({**GOOD, b"X?": b'what? "X" \r\n'}).link)
@@ -425,6 +440,17 @@ def test_ctrl_c_writes_what_was_recorded(tmp_path):
     assert any(c.startswith("# no entry: G?\\r -> nothing") for c in comments(recording))
     check = gonio("profile", "check", pasted(meter, recording, tmp_path / "p"))
     assert check.returncode == 0, check.stderr
+
+
+def test_ctrl_c_need_not_wait_until_a_setting_has_settled(tmp_path):
+    meter = written(tmp_path, METER.replace('verify = "gain"', 'verify = "gain"; settle_ms = 60000'))
+    instrument, out = Instrument({**GOOD, b"G 5": b"OK\r\n"}), tmp_path / "r"
+    with subprocess.Popen([BUILD / "gonio", "profile", "record", meter, instrument.link, "--out", out, "--set", "gain=5"],
+                          stderr=subprocess.PIPE, text=True) as p:
+        wait_for(lambda: b"G 5" in instrument.asked)
+        p.send_signal(signal.SIGINT)
+        assert p.wait(PATIENCE_S) == 130
+    assert 'does = "set_gain"' in out.read_text()  # it was sent and answered
 
 
 def test_a_recording_is_not_written_over(start_sim, tmp_path):

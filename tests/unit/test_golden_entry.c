@@ -187,6 +187,7 @@ static void exchanges_become_entries(void **state)
         {echoes, "x?\r", "x?\r3\r> ", "x", "", "x", "x?", "3", "x = 3", ""},
         {echoes, "g\r", "g\r\r> ", "go", "", "go", "g", "", "", ""},
         {summed, "x?*B7\r", "3*33\rOK\r", "x", "", "x", "x?*B7", "3*33", "x = 3", ""},
+        {summed, "x?*B7\r", "err*49\r", "x", "", "x", "x?*B7", "err*49", "", ""}, // and no OK
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
