@@ -103,6 +103,19 @@ void out_json(const json_t *o)
     putchar('\n');
 }
 
+json_t *out_json_text(const char *text)
+{
+    json_t *o = json_string(text);
+    char *copy = o ? NULL : strdup(text);
+    for (char *c = copy; c && *c; c++)
+        if ((unsigned char)*c >= 0x80)
+            *c = '?';
+    if (copy)
+        o = json_string(copy);
+    free(copy);
+    return o ? o : json_null();
+}
+
 void out_json_line(const json_t *o)
 {
     json_dumpf(o, stdout, JSON_COMPACT | JSON_REAL_PRECISION(17));

@@ -33,6 +33,8 @@ int out_fail(const struct gon_error *err);
 
 void out_json(const struct json_t *o);      // indented, with a newline, on stdout
 void out_json_line(const struct json_t *o); // one line, flushed
+// A text as JSON; where it is no UTF-8, as a file's name may be, with ? for what is not ASCII.
+struct json_t *out_json_text(const char *text);
 
 // Writes what stdout still holds; EXIT_FAILED when it could not be written, else status.
 int out_finish(int status);

@@ -17,7 +17,7 @@ struct options {
     bool fast;
 };
 
-const struct option_row profile_sim_options[] = {
+static const struct option_row profile_sim_options[] = {
     {"--run-dir", OPTION_TEXT, offsetof(struct options, run_dir), "DIR", 0, 0,
      "where its pty and control socket appear; else a folder of its own"},
     {"--unit", OPTION_INT, offsetof(struct options, unit), "N", 1, 247,

@@ -308,3 +308,8 @@ const struct link_stats *bus_stats(const struct bus *b)
 {
     return transport_stats(b->t);
 }
+
+void bus_tap(struct bus *b, const struct tap *tap)
+{
+    transport_tap(b->t, tap);
+}

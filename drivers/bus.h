@@ -25,6 +25,7 @@
 
 struct bus;
 struct link_stats;
+struct tap;
 
 // timeout_ms: of one answer, 10..200 (the laser's lease allows no longer silence); quiet_ms: the
 // slowest answer a unit was ever seen to give, 20..5000.
@@ -56,3 +57,6 @@ int bus_exception(const struct bus *b);  // code of the last answer; 0: it was n
 int64_t bus_now_ns(const struct bus *b); // of its clock
 const char *bus_link(const struct bus *b);
 const struct link_stats *bus_stats(const struct bus *b);
+// Who is told of every frame (drivers/tap.h); borrowed. Each request then takes a thread and some
+// 0.1 ms more. NULL: nobody.
+void bus_tap(struct bus *b, const struct tap *tap);

@@ -56,8 +56,7 @@ static size_t frame_size(const struct golden_bytes *b)
     return b->byte[1] == 15 || b->byte[1] == 16 ? (size_t)b->byte[6] + 9 : 8;
 }
 
-// What a unit answers to a write: its first six bytes.
-static void acknowledge(struct golden_peer *g)
+void golden_bytes_add_crc(struct golden_bytes *b)
 {
     static const struct profile_checksum crc = {.kind = PROFILE_CRC,
                                                 .width = 16,
@@ -65,11 +64,19 @@ static void acknowledge(struct golden_peer *g)
                                                 .initial = 0xffff,
                                                 .reflect_in = true,
                                                 .reflect_out = true};
-    struct golden_bytes b = {.size = 8};
+    if (b->size + 2 > sizeof b->byte)
+        return;
+    const uint32_t sum = checksum_of(&crc, b->byte, b->size);
+    b->byte[b->size++] = (uint8_t)sum;
+    b->byte[b->size++] = (uint8_t)(sum >> 8);
+}
+
+// What a unit answers to a write: its first six bytes.
+static void acknowledge(struct golden_peer *g)
+{
+    struct golden_bytes b = {.size = 6};
     memcpy(b.byte, g->got.byte, 6);
-    const uint32_t sum = checksum_of(&crc, b.byte, 6);
-    b.byte[6] = (uint8_t)sum;
-    b.byte[7] = (uint8_t)(sum >> 8);
+    golden_bytes_add_crc(&b);
     if (g->got.byte[1] == 5 || g->got.byte[1] == 6 || g->got.byte[1] == 15 || g->got.byte[1] == 16)
         answer(g, &b);
 }
@@ -181,10 +188,9 @@ const char *golden_peer_path(const struct golden_peer *peer)
     return peer->path;
 }
 
-// Terminators and the like as \r or \x07; Modbus in hexadecimal.
-static void show_byte(uint8_t c, bool rtu, char ret_text[8])
+static void show_byte(uint8_t c, bool hex, char ret_text[8])
 {
-    if (rtu)
+    if (hex)
         snprintf(ret_text, 8, "%02X ", c);
     else if (c == '\r' || c == '\n')
         snprintf(ret_text, 8, "\\%c", c == '\r' ? 'r' : 'n');
@@ -194,15 +200,15 @@ static void show_byte(uint8_t c, bool rtu, char ret_text[8])
         snprintf(ret_text, 8, "%c", c);
 }
 
-static void show(const struct golden_bytes *b, bool rtu, char *out, size_t size)
+void golden_bytes_show(const struct golden_bytes *b, bool hex, char *out, size_t size)
 {
     size_t used = 0;
     *out = 0;
     for (size_t i = 0; i < b->size && used + 8 < size; i++) {
-        show_byte(b->byte[i], rtu, out + used);
+        show_byte(b->byte[i], hex, out + used);
         used += strlen(out + used);
     }
-    if (rtu && used > 0)
+    if (hex && used > 0)
         out[used - 1] = 0; // the last blank
 }
 
@@ -213,8 +219,8 @@ static int differs(const struct golden_peer *g, struct gon_error *err)
     size_t at = 0;
     while (at < got->size && at < expected->size && got->byte[at] == expected->byte[at])
         at++;
-    show(got, g->script.rtu, a, sizeof a);
-    show(expected, g->script.rtu, b, sizeof b);
+    golden_bytes_show(got, g->script.rtu, a, sizeof a);
+    golden_bytes_show(expected, g->script.rtu, b, sizeof b);
     return gon_fail(err, GON_E_INPUT, "sent: got %s / expected %s / at byte %zu",
                     *a ? a : "nothing", b, at);
 }

@@ -16,6 +16,11 @@ struct golden_bytes {
     size_t size;
 };
 
+// The CRC of an RTU frame behind it, low byte first; nothing where there is no room.
+void golden_bytes_add_crc(struct golden_bytes *b);
+// Text with terminators and the like as \r or \x07; hex: "07 10 62". Cut off where size ends.
+void golden_bytes_show(const struct golden_bytes *b, bool hex, char *ret_text, size_t size);
+
 // Terminators included.
 struct golden_script {
     struct golden_bytes sent, received; // no bytes received: it stays silent

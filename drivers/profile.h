@@ -10,7 +10,7 @@
 //              its register; a message instrument's are found in answers by their patterns.
 //   exchanges  (message instruments) one command and its answer, as patterns (profile_text.h)
 //   writes     (Modbus instruments) registers set in one transaction, or one command bit's edge
-//   golden     bytes that a manual or public source shows, and what they mean
+//   golden     bytes that a manual, public source or recording shows, and what they mean
 //   roles      what laser, detector, axis or selector are made of: which exchanges or values are
 //              asked, and conditions (profile_when.h) over the values that came
 //   simulate   how the simulated instrument behaves beyond remembering what it was told
@@ -221,7 +221,7 @@ struct profile_golden {
     char with[PROFILE_LONG]; // what is set: "setpoint_w = 0.1, ..."
     char sent[PROFILE_LONG], received[PROFILE_LONG];
     char gives[PROFILE_LONG];  // values read from it, in the same form
-    char source[PROFILE_TEXT]; // manual and page, or public repository and path
+    char source[PROFILE_TEXT]; // manual and page, public repository and path, or "recorded ..."
 };
 
 // --- roles ---------------------------------------------------------------------------------------

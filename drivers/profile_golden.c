@@ -7,14 +7,16 @@
 #include "drivers/session.h"
 
 #include <ctype.h>
+#include <fnmatch.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define NEAR 1e-6 // relative: sources print some digits
 #define EXCEPTION 0x80
+#define COUNT_MOST ((int)(sizeof((struct golden_params *)0)->name / PROFILE_NAME))
 
-enum { PARAMS = 16, TIMEOUT_MS = 200, QUIET_MS = 20 };
+enum { TIMEOUT_MS = 200, QUIET_MS = 20 };
 
 // --- bytes ---------------------------------------------------------------------------------------
 
@@ -27,10 +29,22 @@ static void add(struct golden_bytes *b, const char *text)
     }
 }
 
-// What the instrument sends: echo, answer, the line that says OK, as its framing has them.
-static void add_answer(const struct profile_framing *f, const struct profile_golden *g,
+// What is asked for errors says their texts and does not refuse.
+bool profile_golden_refuses(const struct profile *p, const char *does, const char *answer)
+{
+    const bool asks_errors = *p->errors.ask && strcmp(does, p->errors.ask) == 0;
+    for (int i = 0; i < p->refusals_count && !asks_errors; i++)
+        if (fnmatch(p->refusals[i].like, answer, FNM_CASEFOLD) == 0)
+            return p->refusals[i].means != PROFILE_FINE;
+    return false;
+}
+
+// What the instrument sends: echo, answer, the line that says OK, as its framing has them. No such
+// line follows a refusal.
+static void add_answer(const struct profile *p, const struct profile_golden *g,
                        struct golden_bytes *b)
 {
+    const struct profile_framing *f = &p->framing;
     if (*f->echo_end) {
         add(b, g->sent);
         add(b, f->echo_end);
@@ -38,7 +52,7 @@ static void add_answer(const struct profile_framing *f, const struct profile_gol
     add(b, g->received);
     if (*f->echo_end || *g->received)
         add(b, f->end_in);
-    if (*f->ok_line) {
+    if (*f->ok_line && !profile_golden_refuses(p, g->does, g->received)) {
         add(b, f->ok_line);
         add(b, f->end_in);
     }
@@ -69,14 +83,8 @@ static int read_frame(const char *text, const char *name, struct golden_bytes *r
 
 // --- values --------------------------------------------------------------------------------------
 
-struct params {
-    char name[PARAMS][PROFILE_NAME];
-    struct profile_param param[PARAMS + 1];
-};
-
-// Of a write: each name is a $NAME, a value, or both.
-static int read_params(const struct profile *p, const char *text, struct profile_data *d,
-                       struct params *ret_params, struct gon_error *err)
+int profile_golden_with(const struct profile *p, const char *text, struct profile_data *d,
+                        struct golden_params *ret_params, struct gon_error *err)
 {
     const char *at = text;
     int count = 0;
@@ -88,7 +96,8 @@ static int read_params(const struct profile *p, const char *text, struct profile
         const struct profile_token sign = profile_token_next(&at), right = profile_token_next(&at);
         const int value = profile_value(p, name.text);
         double number;
-        if (!profile_token_is(&sign, "=") || strlen(name.text) >= PROFILE_NAME || count == PARAMS ||
+        if (!profile_token_is(&sign, "=") || strlen(name.text) >= PROFILE_NAME ||
+            count == COUNT_MOST ||
             profile_literal(value < 0 ? NULL : &p->values[value], right.text, &number, NULL) < 0)
             return gon_fail(err, GON_E_INPUT, "with: '%.80s' is not NAME = NUMBER, ...", text);
         if (value >= 0)
@@ -206,7 +215,7 @@ static int talk_bus(const struct profile *p, const struct profile_golden *g, con
                     struct gon_error *err)
 {
     struct bus *bus;
-    struct params params = {0};
+    struct golden_params params = {0};
     char link[100];
     snprintf(link, sizeof link, "modbus-rtu:%s", path);
     int rc = bus_open(link, TIMEOUT_MS, QUIET_MS, clk_system(), NULL, &bus, err);
@@ -216,7 +225,7 @@ static int talk_bus(const struct profile *p, const struct profile_golden *g, con
     if (!s)
         rc = gon_fail(err, GON_E_SYSTEM, "out of memory");
     else
-        rc = read_params(p, g->with, session_data(s), &params, err);
+        rc = profile_golden_with(p, g->with, session_data(s), &params, err);
     if (rc == 0)
         rc = *g->does ? session_send(s, g->does, params.param, err) : ask_bus(p, g, s, err);
     session_free(s);
@@ -233,7 +242,7 @@ static int write_script(const struct profile *p, const struct profile_golden *g,
     if (p->protocol == PROFILE_MESSAGE) {
         add(&s->sent, g->sent);
         add(&s->sent, p->framing.end_out);
-        add_answer(&p->framing, g, &s->received);
+        add_answer(p, g, &s->received);
         return 0;
     }
     s->rtu = true;

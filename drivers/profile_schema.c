@@ -261,7 +261,8 @@ static const struct cfg_row golden_rows[] = {
           "The bytes without terminator; Modbus: an RTU frame in hexadecimal."),
     BYTES(profile_golden, "received", received, "", "The answer, in the same form."),
     TEXT(profile_golden, "gives", gives, "", "What is read from it: \"x = 0.951359\"."),
-    TEXT(profile_golden, "source", source, NULL, "Manual and page, or public code, that shows it."),
+    TEXT(profile_golden, "source", source, NULL,
+         "Manual and page, or public code, that shows it; or that it was recorded, and from what."),
     {0}};
 
 // --- roles ---------------------------------------------------------------------------------------
@@ -457,5 +458,5 @@ const struct cfg_row profile_schema[] = {
     GROUP(profile, "inputs", inputs, input_rows, "The role of switches and sensors."),
     GROUP(profile, "simulate", simulate, simulate_rows, "How the simulated instrument behaves."),
     GROUPS(profile, "golden", golden, golden_count, golden_rows,
-           "Bytes that a manual or public source shows, and what they mean."),
+           "Bytes that a manual, public source or recording shows, and what they mean."),
     {0}};

@@ -114,15 +114,21 @@ void transport_take_turn(struct transport *t)
 int transport_write(struct transport *t, const void *data, size_t size, int64_t deadline_ns,
                     struct gon_error *err)
 {
+    const uint64_t before = t->stats.bytes_out;
     t->ended = false;
-    return t->ops->write(t, data, size, deadline_ns, err);
+    int rc = t->ops->write(t, data, size, deadline_ns, err);
+    transport_show(t, TAP_SENT, data, (size_t)(t->stats.bytes_out - before));
+    return rc;
 }
 
 int transport_read(struct transport *t, void *data, size_t size, int64_t deadline_ns,
                    struct gon_error *err)
 {
     t->ended = false;
-    return t->ops->read(t, data, size, deadline_ns, err);
+    int rc = t->ops->read(t, data, size, deadline_ns, err);
+    if (rc > 0)
+        transport_show(t, TAP_RECEIVED, data, (size_t)rc);
+    return rc;
 }
 
 int transport_drain(struct transport *t, int64_t quiet_ns, struct gon_error *err)
@@ -149,6 +155,22 @@ const char *transport_link(const struct transport *t)
 const struct link_stats *transport_stats(const struct transport *t)
 {
     return &t->stats;
+}
+
+void transport_tap(struct transport *t, const struct tap *tap)
+{
+    t->tap = tap;
+}
+
+bool transport_tapped(const struct transport *t)
+{
+    return t->tap != NULL;
+}
+
+void transport_show(const struct transport *t, enum tap_way way, const void *bytes, size_t size)
+{
+    if (t->tap && size > 0)
+        t->tap->take(t->tap->ctx, way, bytes, size);
 }
 
 int transport_fd(const struct transport *t)

@@ -25,6 +25,7 @@
 #include "base/clk.h"
 #include "base/err.h"
 #include "drivers/link_stats.h"
+#include "drivers/tap.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -67,6 +68,9 @@ bool transport_ended(const struct transport *t);
 
 const char *transport_link(const struct transport *t);
 const struct link_stats *transport_stats(const struct transport *t);
+// From now on who is told of every byte (over USB: of messages, without their headers); borrowed.
+// NULL: nobody, as at first.
+void transport_tap(struct transport *t, const struct tap *tap);
 
 // --- for the other modules of this layer ---------------------------------------------------------
 int transport_fd(const struct transport *t); // -1: hung up or not reopened; USB
@@ -75,6 +79,9 @@ struct clk *transport_clk(const struct transport *t);
 const struct cancel *transport_mind(struct transport *t, const struct cancel *cancel);
 const struct cancel *transport_cancel(const struct transport *t);
 struct link_stats *transport_book(struct transport *t); // what I/O elsewhere has to enter
+// What I/O elsewhere moved, for the tap; nothing happens without one.
+bool transport_tapped(const struct transport *t);
+void transport_show(const struct transport *t, enum tap_way way, const void *bytes, size_t size);
 // Whoever did I/O on transport_fd and met an error that means "gone" says so: closes, returns
 // GON_E_GONE.
 int transport_hung_up(struct transport *t, int error, struct gon_error *err);

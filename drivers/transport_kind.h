@@ -34,6 +34,7 @@ struct transport {
     int64_t turn_ns; // when the clock last had its turn
     bool ended;      // the last read ended a message
     struct link_stats stats;
+    const struct tap *tap; // NULL: nobody listens
     // of the kinds
     struct serial_port *serial; // NULL: TCP, or closed
     int fd;                     // -1: closed, or USB

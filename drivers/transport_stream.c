@@ -161,6 +161,7 @@ static int stream_drain(struct transport *t, int64_t quiet_ns, struct gon_error 
         int rc = moved(t, read(t->fd, waste, sizeof waste), revents, err);
         if (rc < 0)
             return rc;
+        transport_show(t, TAP_RECEIVED, waste, (size_t)rc);
         dropped += rc;
         t->stats.bytes_in += (size_t)rc;
         if (clk_now_ns(t->clk) >= give_up_ns)

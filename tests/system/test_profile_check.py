@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """gonio profile check, doc, list and settings on what is shipped and on a profile with mistakes."""
+import json
+
 import pytest
 
 from conftest import ROOT, gonio
@@ -69,6 +71,62 @@ def test_list_names_those_of_a_folder_and_those_shipped(tmp_path, monkeypatch):
     assert r.returncode == 0, r.stderr
     names = [line.split("\t")[0] for line in r.stdout.splitlines()]
     assert names == ["name", "meter"] + [p.stem for p in SHIPPED]
+
+
+MEMBERS = ["file", "well", "mistakes", "name", "title", "role", "protocol", "values", "exchanges", "writes", "golden",
+           "unverified", "requests", "requests_wrong"]
+
+
+def test_check_as_json_of_what_is_right():
+    r = gonio("profile", "check", "--json", *SHIPPED)
+    assert r.returncode == 0 and r.stderr == ""
+    o = json.loads(r.stdout)
+    assert list(o) == ["well", "profiles"] and o["well"] is True
+    assert [p["name"] for p in o["profiles"]] == [p.stem for p in SHIPPED]
+    for p in o["profiles"]:
+        assert sorted(p) == sorted(MEMBERS) and p["well"] is True and p["mistakes"] == []
+        golden = p["golden"]
+        assert golden["pass"] == golden["entries"] and golden["recorded"] == 0 and golden["failures"] == []
+        assert p["values"] > 0 and p["exchanges" if p["protocol"] == "message" else "writes"] > 0
+        assert (len(p["requests"]) > 0) == (p["protocol"] == "modbus") and p["requests_wrong"] == 0
+
+
+def test_check_as_json_of_what_is_wrong(tmp_path):
+    bad = write(tmp_path / "bad.cfg", METER.replace('"x 2.00"', '"x 2.000"').replace("manual, page 3", "recorded here"))
+    mistake = write(tmp_path / "mistake.cfg", METER.replace('answer = "{x}"', 'answer = "{y}"'))
+    odd = write(tmp_path / "\udcff.cfg", METER)
+    r = gonio("profile", "check", bad, mistake, "nobody", odd, "--json")
+    assert r.returncode == 2 and r.stderr == ""
+    o = json.loads(r.stdout)
+    assert o["well"] is False
+    failed, wrong, missing, right = o["profiles"]
+    assert all(sorted(p) == sorted(MEMBERS) for p in o["profiles"])
+    assert failed["well"] is False and failed["mistakes"] == [] and failed["name"] == "meter"
+    assert failed["golden"] == {"entries": 1, "pass": 0, "recorded": 1, "failures": [
+        {"entry": 0, "does": "set", "text": "sent: got x 2.00\\r / expected x 2.000\\r / at byte 6"}]}
+    assert wrong["file"] == str(mistake) and wrong["well"] is False
+    assert wrong["mistakes"] == [f"{mistake}:4: exchanges[0].answer = \"{{y}}\": there is no such value at '{{y}}'"]
+    assert missing["file"] == "nobody" and "no profile 'nobody'" in missing["mistakes"][0]
+    for p in (wrong, missing):
+        assert all(p[name] is None for name in MEMBERS[3:])
+    assert right["well"] is True and right["file"] == str(tmp_path / "?.cfg")
+
+
+def test_list_as_json(tmp_path, monkeypatch):
+    meter = write(tmp_path / "meter.cfg", METER)
+    write(tmp_path / "wrong.cfg", "profile: {")
+    monkeypatch.setenv("GONIO_PROFILES", str(tmp_path))
+    r = gonio("profile", "list", "--json")
+    assert r.returncode == 2 and r.stderr == ""
+    o = json.loads(r.stdout)
+    assert list(o) == ["profiles", "mistakes"] and "wrong.cfg" in o["mistakes"][0]
+    assert o["profiles"][0] == {"name": "meter", "role": "inputs", "title": "Meter", "file": str(meter)}
+    assert len(o["profiles"]) == 1 + len(SHIPPED)
+
+
+def test_what_was_recorded_is_told(tmp_path):
+    r = gonio("profile", "check", write(tmp_path / "m.cfg", METER.replace("manual, page 3", "recorded today")))
+    assert "  golden      1 of 1 entries pass\n  recorded    1 of them, from an instrument\n" in r.stdout
 
 
 def test_settings_are_the_manuals():
