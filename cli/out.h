@@ -6,6 +6,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 struct json_t; // of jansson
@@ -24,6 +25,9 @@ void out_warn(const char *fmt, ...)
 
 // "0.0317 ±0.0006": as many decimals as the first digit of u needs; without u, four digits.
 void out_value(char *text, size_t size, double value, double u);
+
+// "2026-11-26 14:05" where we are; "" for 0.
+void out_local(int64_t utc_ms, char *text, size_t size);
 
 // Says the error and returns the exit status that its code stands for.
 int out_fail(const struct gon_error *err);

@@ -10,6 +10,7 @@
 #include "daemon/hub.h"
 #include "daemon/listener.h"
 #include "daemon/loop.h"
+#include "daemon/profile_texts.h"
 #include "daemon/simulator.h"
 
 #include <signal.h>
@@ -60,6 +61,7 @@ struct daemon {
     struct simulator *simulator;
     struct bench_config bench;
     char *bench_text;
+    struct profile_texts profiles;
     char socket[200], directory[4096];
     struct hub *hub;
     struct deadline *deadline; // NULL: not ending yet
@@ -229,7 +231,7 @@ static int open_bench(struct daemon *d, struct gon_error *err)
     if (bench_config_load(path, (struct cfg_sink){say_line, NULL}, &d->bench, &d->bench_text) < 0)
         return gon_fail(err, GON_E_INPUT, "%s: mend the bench file; see: gonio check %s", path,
                         path);
-    return GON_OK;
+    return profile_texts_read(&d->bench, &d->profiles, err);
 }
 
 static int open_places(struct daemon *d, struct gon_error *err)
@@ -268,6 +270,8 @@ static int open_hub(struct daemon *d, struct gon_error *err)
     struct hub_options o = {
         .bench = &d->bench,
         .bench_text = d->bench_text,
+        .profiles = d->profiles.profile,
+        .profiles_count = d->profiles.count,
         .directory = d->directory,
         .simulator = d->simulator != NULL,
         .seed = d->options.seed,
@@ -309,6 +313,7 @@ static int run(struct daemon *d)
     loop_free(d->loop);
     simulator_stop(d->simulator);
     listener_close(d->listener);
+    profile_texts_free(&d->profiles);
     free(d->bench_text);
     return d->status;
 }

@@ -90,7 +90,9 @@ static int set_up(void **state)
                                      w->folder,
                                      w->to_store,
                                      w->to_main,
-                                     w->to_runner};
+                                     w->to_runner,
+                                     NULL,
+                                     0};
     w->storer = storer_new(&w->links);
     struct fitter_links f = {w->cancel, NULL, w->to_main, w->to_store};
     w->fitter = fitter_new(&f);
@@ -237,6 +239,48 @@ static void a_campaign_goes_on_where_it_was_stopped(void **state)
     assert_true(fabs(m->opening.dark_monitor_v - 0.002) < 1e-9);
     run_material_free(m);
     close_run(w, run->id, RUN_STOPPED);
+    free(run);
+}
+
+static bool list_profile(void *ctx, const struct store_kept_profile *p)
+{
+    char *texts = ctx;
+    strcat(strcat(strcat(strcat(texts, p->profile.name), "="), p->profile.text), " ");
+    return true;
+}
+
+static bool list_event(void *ctx, const struct store_event *e)
+{
+    char *texts = ctx;
+    strcat(strcat(texts, e->level), ": ");
+    strcat(strcat(texts, e->text), "\n");
+    return true;
+}
+
+// What it is measured with today is kept, too, when a campaign goes on another day.
+static void profiles_are_kept_at_the_beginning_and_when_it_goes_on(void **state)
+{
+    struct world *w = *state;
+    struct store_profile profiles[] = {{"sr830", "detector", "one"}, {"az", "axis", "two"}};
+    struct storer_links links = w->links;
+    char texts[200] = "", events[2000] = "";
+    links.profiles = profiles;
+    links.profiles_count = 2;
+    storer_free(w->storer);
+    w->storer = storer_new(&links);
+    struct run *run = create(w);
+    run_material_free(open_run(w, run));
+    close_run(w, run->id, RUN_STOPPED);
+    profiles[1].text = "three";
+    run_material_free(open_run(w, run));
+    close_run(w, run->id, RUN_STOPPED);
+    struct store *s;
+    assert_int_equal(store_open(run->path, STORE_READ, &s, NULL), 0);
+    assert_int_equal(store_each_profile(s, list_profile, texts, NULL), 3);
+    assert_string_equal(texts, "sr830=one az=two az=three ");
+    store_each_event(s, 0, list_event, events, NULL);
+    assert_string_equal(events, "");
+    store_close(s, NULL);
     free(run);
 }
 
@@ -496,6 +540,7 @@ int main(void)
 #define TEST(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         TEST(a_campaign_goes_on_where_it_was_stopped),
+        TEST(profiles_are_kept_at_the_beginning_and_when_it_goes_on),
         TEST(a_row_offered_again_is_accepted_only_when_it_is_the_same),
         TEST(a_wrong_campaign_is_complained_of_line_by_line),
         TEST(another_bench_is_refused),
