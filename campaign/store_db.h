@@ -50,9 +50,19 @@ extern const char store_schema_sql[], store_profile_sql[];
 // every column of every row in order; integers and reals as 8 little-endian bytes, texts with their
 // final NUL.
 int store_plan_crc(struct store *s, uint32_t *ret_crc, struct gon_error *err);
+// GON_E_STORE: not as meta says.
+int store_check_plan(struct store *s, struct gon_error *err);
 int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err);
 
-// campaign/store_profiles.c: within a transaction.
+// campaign/store_read.c: a row of these columns.
+#define STORE_READING_COLUMNS                                                                      \
+    "sweep, point, attempt, t_utc_ms, theta_i_udeg, theta_r_udeg, signal_v, signal_sd_v,"          \
+    " monitor_v, monitor_sd_v, samples, detector_range, flags, crc32c"
+enum { STORE_READING_CRC = 13 };
+struct store_reading store_db_reading(sqlite3_stmt *q);
+
+// campaign/store_profiles.c: of its columns without the last; and, within a transaction:
+uint32_t store_profile_crc(int64_t t_utc_ms, const struct store_profile *p);
 int store_put_profile(struct store *s, int64_t t_utc_ms, const struct store_profile *p,
                       struct gon_error *err);
 

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-static uint32_t profile_crc(int64_t t_utc_ms, const struct store_profile *p)
+uint32_t store_profile_crc(int64_t t_utc_ms, const struct store_profile *p)
 {
     const char *const texts[] = {p->name, p->role, p->text};
     unsigned char bytes[8];
@@ -32,7 +32,7 @@ int store_put_profile(struct store *s, int64_t t_utc_ms, const struct store_prof
     store_db_bind_text(q, 2, p->name);
     store_db_bind_text(q, 3, p->role);
     store_db_bind_text(q, 4, p->text);
-    sqlite3_bind_int64(q, 5, profile_crc(t_utc_ms, p));
+    sqlite3_bind_int64(q, 5, store_profile_crc(t_utc_ms, p));
     return store_db_finish(s, q, err);
 }
 
@@ -58,7 +58,7 @@ static const char *text_of(sqlite3_stmt *q, int column)
 static int check(struct store *s, const struct store_kept_profile *p, sqlite3_int64 crc,
                  struct gon_error *err)
 {
-    if (crc == profile_crc(p->t_utc_ms, &p->profile))
+    if (crc == store_profile_crc(p->t_utc_ms, &p->profile))
         return GON_OK;
     return gon_fail(err, GON_E_STORE,
                     "%s: the profile %lld (%.60s) kept in it is damaged (its check value is "
