@@ -6,6 +6,7 @@
 #include "campaign/store_verify.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 
 static struct {
     char texts[8000];
@@ -201,6 +202,21 @@ static void a_broken_page_is_a_finding(void **state)
     close(fd);
 }
 
+// What no query would notice: the count of lost bytes in the last page's header.
+static void a_wrong_page_header_is_a_finding(void **state)
+{
+    (void)state;
+    struct stat st;
+    store_close(filled(), NULL);
+    int fd = open(path, O_RDWR);
+    assert_int_equal(fstat(fd, &st), 0);
+    assert_int_equal(pwrite(fd, "\x2a", 1, st.st_size - 4096 + 7), 1);
+    close(fd);
+    assert_int_equal(verified().findings, 1);
+    assert_non_null(strstr(found.texts, "structure: "));
+    assert_non_null(strstr(found.texts, "reported as 42"));
+}
+
 #define TEST(f) cmocka_unit_test_setup_teardown(f, begin, end)
 
 int main(void)
@@ -210,6 +226,7 @@ int main(void)
         TEST(older_files_are_whole),
         TEST(what_is_damaged_is_named),
         TEST(a_broken_page_is_a_finding),
+        TEST(a_wrong_page_header_is_a_finding),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
