@@ -63,6 +63,7 @@ struct daemon {
     char *bench_text;
     struct profile_texts profiles;
     char socket[200], directory[4096];
+    struct catalog_hold *hold; // of the directory
     struct hub *hub;
     struct deadline *deadline; // NULL: not ending yet
     bool dark;                 // the laser, when the bench was last looked at
@@ -239,6 +240,9 @@ static int open_places(struct daemon *d, struct gon_error *err)
     const char *dir = d->options.dir ? d->options.dir : d->bench.directory;
     int rc = catalog_directory(dir, d->directory, sizeof d->directory, err);
     rc = rc < 0 ? rc : catalog_make_directory(d->directory, err);
+    rc = rc < 0 ? rc : catalog_take(d->directory, &d->hold, err);
+    if (rc == GON_E_REFUSED)
+        gon_prefix(err, "campaigns cannot be kept there; choose another folder with --dir");
     return rc;
 }
 
@@ -312,6 +316,7 @@ static int run(struct daemon *d)
     }
     loop_free(d->loop);
     simulator_stop(d->simulator);
+    catalog_drop(d->hold);
     listener_close(d->listener);
     profile_texts_free(&d->profiles);
     free(d->bench_text);

@@ -136,3 +136,13 @@ def test_verify_looks_at_a_file_that_is_being_measured(daemon):
         assert 0 < seen["readings"] < seen["points"]
     daemon.gonio("stop")
     events.until_state(reply["run"], "stopped")
+
+
+def test_a_folder_has_one_daemon(daemon, start_sim, tmp_path):
+    """Another socket and another bench, but the same campaigns."""
+    sim = start_sim("--fast")
+    second = Daemon(tmp_path, "--config", sim.folder / "goniod-tcp.cfg", "--dir", daemon.directory, ready=False)
+    assert second.process.wait(PATIENCE_S) == 4
+    assert f"in use by process {daemon.pid}" in second.errors()
+    assert "--dir" in second.errors()
+    assert daemon.gonio("status").returncode == 0

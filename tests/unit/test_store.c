@@ -3,6 +3,7 @@
 #include "store_fixture.h"
 
 #include "base/units.h"
+#include "campaign/catalog.h"
 #include "campaign/reduce.h"
 #include "campaign/store_lock.h"
 #include "campaign/store_row.h"
@@ -18,6 +19,8 @@
 #include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/vfs.h>
 #include <sys/wait.h>
 #include <time.h>
 
@@ -1027,6 +1030,64 @@ static void network_file_systems_are_known(void **state)
     assert_int_equal(store_lock_local(path, NULL), 0);
 }
 
+// Also for the library: what a mounted NFS would answer.
+static long pretended_type;
+
+int statfs(const char *file, struct statfs *ret_fs)
+{
+    const int rc = (int)syscall(SYS_statfs, file, ret_fs);
+    if (rc == 0 && pretended_type)
+        ret_fs->f_type = pretended_type;
+    return rc;
+}
+
+static void nothing_is_written_on_a_network_file_system(void **state)
+{
+    (void)state;
+    struct store *s;
+    struct gon_error err;
+    struct catalog_hold *hold;
+    store_close(created(), NULL);
+    pretended_type = 0x6969;
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "lies on a network file system"));
+    assert_int_equal(catalog_take(folder.path, &hold, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "lies on a network file system"));
+    assert_int_equal(store_open(path, STORE_READ, &s, NULL), 0);
+    store_close(s, NULL);
+    assert_int_equal(fixture_files(&folder), 1);
+    assert_int_equal(unlink(path), 0);
+    const struct campaign_config config = fixture_campaign(CONFIG);
+    const struct bench_config bench = fixture_bench();
+    struct plan plan;
+    assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
+    const struct store_new what = {&config, CONFIG, "test.cfg", &bench, FIXTURE_BENCH,
+                                   &plan,   1,      NULL,       0};
+    assert_int_equal(store_create(path, &what, &s, &err), GON_E_REFUSED);
+    assert_int_equal(fixture_files(&folder), 0);
+    plan_clear(&plan);
+    pretended_type = 0;
+}
+
+static void a_folder_is_for_one_daemon(void **state)
+{
+    (void)state;
+    struct catalog_hold *hold, *second;
+    struct gon_error err;
+    char mine[40], lock[160];
+    snprintf(mine, sizeof mine, "in use by process %d", (int)getpid());
+    assert_int_equal(catalog_take(folder.path, &hold, NULL), 0);
+    assert_int_equal(catalog_take(folder.path, &second, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, mine));
+    catalog_drop(hold);
+    fixture_path(&folder, ".goniod.lock", lock, sizeof lock);
+    assert_int_equal(access(lock, F_OK), -1);
+    // Of one that was killed.
+    close(open(lock, O_CREAT | O_WRONLY, 0600));
+    assert_int_equal(catalog_take(folder.path, &hold, NULL), 0);
+    catalog_drop(hold);
+}
+
 static void flags_are_words(void **state)
 {
     (void)state;
@@ -1077,6 +1138,8 @@ int main(void)
         TEST(readings_are_small),
         TEST(events_and_states_are_a_history),
         TEST(network_file_systems_are_known),
+        TEST(nothing_is_written_on_a_network_file_system),
+        TEST(a_folder_is_for_one_daemon),
         TEST(flags_are_words),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
