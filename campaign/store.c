@@ -3,6 +3,7 @@
 
 #include "campaign/store_db.h"
 #include "campaign/store_file.h"
+#include "campaign/store_reserve.h"
 #include "campaign/store_row.h"
 
 #include <errno.h>
@@ -27,16 +28,27 @@ static int busy(struct store *s, struct gon_error *err)
                     s->path, who);
 }
 
+// Room for what is to be said of it; a quota is an I/O error for SQLite, and so is a full disk where
+// it makes its -shm file.
+static int full(struct store *s, int rc, struct gon_error *err)
+{
+    s->broken = s->broken || (rc & 0xff) == SQLITE_IOERR;
+    s->full = true;
+    if (s->mode == STORE_WRITE)
+        store_reserve_give(s->path);
+    return gon_fail(err, GON_E_STORE, "%s: the disk is full; free some space on it", s->path);
+}
+
 int store_db_fail(struct store *s, struct gon_error *err)
 {
     const int rc = s->db ? sqlite3_extended_errcode(s->db) : SQLITE_NOMEM;
     const char *text = s->db ? sqlite3_errmsg(s->db) : "out of memory";
     const int error = s->db ? sqlite3_system_errno(s->db) : 0;
+    if (rc == SQLITE_FULL || error == EDQUOT || error == ENOSPC)
+        return full(s, rc, err);
     switch (rc & 0xff) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED: return busy(s, err);
-    case SQLITE_FULL:
-        return gon_fail(err, GON_E_STORE, "%s: the disk is full; free some space on it", s->path);
     case SQLITE_IOERR:
         s->broken = true;
         return gon_fail(err, GON_E_STORE, "%s: %s (%s); look at the disk", s->path, text,
@@ -260,6 +272,8 @@ int store_open(const char *path, enum store_mode mode, struct store **ret_store,
         rc = check_newest(s, err);
     if (rc >= 0 && mode == STORE_WRITE)
         rc = store_migrate(s, err);
+    if (rc >= 0 && mode == STORE_WRITE)
+        s->full = !store_reserve_take(path);
     if (rc < 0) {
         store_close(s, NULL);
         return rc;
@@ -304,6 +318,8 @@ int store_close(struct store *s, struct gon_error *err)
             rc = store_db_fail(s, err);
     }
     close_db(s);
+    if (s->lock.fd >= 0) // ours
+        store_reserve_give(s->path);
     store_lock_drop(&s->lock);
     free(s);
     return rc;

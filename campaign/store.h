@@ -5,7 +5,8 @@
 //
 // While it is written: WAL, synchronous=FULL, a commit a call. Closed: a single file. One writer at
 // a time, held by a lock on "FILE-lock" beside it, which names its process; readers never wait for
-// it. A struct store belongs to one thread; several may be open on one file.
+// it. "FILE-reserve" is room on the disk: when that is full, readings are refused until there is
+// room again, while events and states are still written. A struct store belongs to one thread; several may be open on one file.
 //
 // Errors: GON_E_STORE, the file or its disk (full, I/O, busy, moved, damaged: the text says which
 // and what to do); after one the same call may be repeated. GON_E_REFUSED: in use by another

@@ -21,6 +21,7 @@ struct store {
     char path[512];
     struct store_watch file, wal; // as they were opened
     int64_t rows;                 // readings that were acknowledged, or there when it was opened
+    bool full;   // the disk: the reserve is given away, no reading until it is back
     bool broken; // after an I/O error nothing that SQLite remembers can be trusted: reopen first
     int patience_ms;
     int version; // of the file
