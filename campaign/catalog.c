@@ -62,6 +62,30 @@ int catalog_make_directory(const char *directory, struct gon_error *err)
     return rc;
 }
 
+struct catalog_hold {
+    struct store_lock lock;
+};
+
+int catalog_take(const char *directory, struct catalog_hold **ret_hold, struct gon_error *err)
+{
+    struct catalog_hold *hold = malloc(sizeof *hold);
+    if (!hold)
+        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", directory);
+    int rc = store_lock_take_folder(&hold->lock, directory, err);
+    if (rc < 0)
+        free(hold);
+    else
+        *ret_hold = hold;
+    return rc;
+}
+
+void catalog_drop(struct catalog_hold *hold)
+{
+    if (hold)
+        store_lock_drop(&hold->lock);
+    free(hold);
+}
+
 // --- names ---------------------------------------------------------------------------------------
 
 static bool ends(const char *name, const char *suffix)

@@ -27,6 +27,13 @@ int catalog_directory(const char *wanted, char *ret_directory, size_t size, stru
 // Makes the directory (and its parents) when it is missing.
 int catalog_make_directory(const char *directory, struct gon_error *err);
 
+// The directory for one daemon: GON_E_REFUSED when another process has it ("in use by process
+// 4711") or it lies on a network file system. Held until it is dropped or the process ends, however
+// that ends.
+struct catalog_hold;
+int catalog_take(const char *directory, struct catalog_hold **ret_hold, struct gon_error *err);
+void catalog_drop(struct catalog_hold *hold); // NULL is fine
+
 // A new campaign file with the next number, open for writing. The number is above all that are
 // there, and above one (0: any) that somebody remembers of files that are gone.
 int catalog_create(const char *directory, int above, const struct store_new *what,

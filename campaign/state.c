@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "campaign/state.h"
 
-#include "campaign/store_lock.h"
-
 #include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +14,6 @@ enum {
 
 struct state {
     sqlite3 *db;
-    struct store_lock lock;
     char path[512];
 };
 
@@ -108,12 +105,9 @@ int state_open(const char *directory, struct state **ret_state, struct gon_error
     struct state *s = calloc(1, sizeof *s);
     if (!s)
         return gon_fail(err, GON_E_SYSTEM, STATE_FILE ": out of memory");
-    s->lock.fd = -1;
     int rc = GON_OK;
     if (snprintf(s->path, sizeof s->path, "%s/" STATE_FILE, directory) >= (int)sizeof s->path)
         rc = gon_fail(err, GON_E_INPUT, "%s: the path is too long", directory);
-    rc = rc < 0 ? rc : store_lock_local(s->path, err);
-    rc = rc < 0 ? rc : store_lock_take(&s->lock, s->path, err);
     rc = rc < 0 ? rc : open_db(s, err);
     if (rc < 0) {
         state_close(s);
@@ -128,8 +122,6 @@ void state_close(struct state *s)
     if (!s)
         return;
     sqlite3_close(s->db);
-    if (s->lock.fd >= 0)
-        store_lock_drop(&s->lock);
     free(s);
 }
 

@@ -4,9 +4,8 @@
 // WAL, synchronous=FULL; each call is one transaction, written through when it returns. Thread: the
 // store's.
 //
-// The lock on "state.db-lock", held while it is open, is also that of the folder: one daemon a
-// folder. GON_E_REFUSED: another process has it (named), a network file system, or a file of a
-// newer gonio. GON_E_STORE: the file or its disk.
+// Whoever opens it has the folder (catalog_take). GON_E_REFUSED: a file of a newer gonio.
+// GON_E_STORE: the file or its disk.
 #pragma once
 #include "base/err.h"
 

@@ -2,6 +2,8 @@
 #include "campaign/store.h"
 
 #include "campaign/store_db.h"
+#include "campaign/store_file.h"
+#include "campaign/store_reserve.h"
 #include "campaign/store_row.h"
 
 #include <errno.h>
@@ -26,17 +28,27 @@ static int busy(struct store *s, struct gon_error *err)
                     s->path, who);
 }
 
+// Room for what is to be said of it; a quota is an I/O error for SQLite, and so is a full disk where
+// it makes its -shm file.
+static int full(struct store *s, int rc, struct gon_error *err)
+{
+    s->broken = s->broken || (rc & 0xff) == SQLITE_IOERR;
+    s->full = true;
+    if (s->mode == STORE_WRITE)
+        store_reserve_give(s->path);
+    return gon_fail(err, GON_E_STORE, "%s: the disk is full; free some space on it", s->path);
+}
+
 int store_db_fail(struct store *s, struct gon_error *err)
 {
     const int rc = s->db ? sqlite3_extended_errcode(s->db) : SQLITE_NOMEM;
     const char *text = s->db ? sqlite3_errmsg(s->db) : "out of memory";
     const int error = s->db ? sqlite3_system_errno(s->db) : 0;
+    if (rc == SQLITE_FULL || error == EDQUOT || error == ENOSPC)
+        return full(s, rc, err);
     switch (rc & 0xff) {
     case SQLITE_BUSY:
-    case SQLITE_LOCKED:
-        return busy(s, err);
-    case SQLITE_FULL:
-        return gon_fail(err, GON_E_STORE, "%s: the disk is full; free some space on it", s->path);
+    case SQLITE_LOCKED: return busy(s, err);
     case SQLITE_IOERR:
         s->broken = true;
         return gon_fail(err, GON_E_STORE, "%s: %s (%s); look at the disk", s->path, text,
@@ -131,6 +143,19 @@ static int pragma(struct store *s, const char *sql, int64_t *ret_value, struct g
     return rc;
 }
 
+static int newer(struct store *s, struct gon_error *err)
+{
+    char *writer = store_read_meta(s, "gonio_version"); // if that is still where it was
+    gon_fail(err, GON_E_REFUSED,
+             "%s: version %d of the file, of a newer gonio (begun with %s); this one (%s) knows "
+             "versions up to %d: install the newer one, or take the copy that it made before it "
+             "changed an older file (.v%d-backup beside it)",
+             s->path, s->version, writer ? writer : "?", GONIO_VERSION, STORE_VERSION,
+             STORE_VERSION);
+    free(writer);
+    return GON_E_REFUSED;
+}
+
 // SQLITE_NOTADB means here that somebody named a file that never was one.
 static int identify(struct store *s, struct gon_error *err)
 {
@@ -142,12 +167,8 @@ static int identify(struct store *s, struct gon_error *err)
         return rc;
     if (application != STORE_APPLICATION)
         return gon_fail(err, GON_E_INPUT, "%s: not a campaign file", s->path);
-    if (version > STORE_VERSION)
-        return gon_fail(err, GON_E_REFUSED,
-                        "%s: written by a newer gonio (version %lld of the file; this one reads "
-                        "up to %d)",
-                        s->path, (long long)version, STORE_VERSION);
-    return GON_OK;
+    s->version = (int)version;
+    return version > STORE_VERSION ? newer(s, err) : GON_OK;
 }
 
 static int quick_check(struct store *s, struct gon_error *err)
@@ -249,6 +270,10 @@ int store_open(const char *path, enum store_mode mode, struct store **ret_store,
         rc = mode == STORE_WRITE ? open_for_writing(s, err) : open_for_reading(s, err);
     if (rc >= 0 && mode == STORE_WRITE)
         rc = check_newest(s, err);
+    if (rc >= 0 && mode == STORE_WRITE)
+        rc = store_migrate(s, err);
+    if (rc >= 0 && mode == STORE_WRITE)
+        s->full = !store_reserve_take(path);
     if (rc < 0) {
         store_close(s, NULL);
         return rc;
@@ -293,6 +318,8 @@ int store_close(struct store *s, struct gon_error *err)
             rc = store_db_fail(s, err);
     }
     close_db(s);
+    if (s->lock.fd >= 0) // ours
+        store_reserve_give(s->path);
     store_lock_drop(&s->lock);
     free(s);
     return rc;
@@ -309,35 +336,17 @@ int store_writer(const char *path)
     return store_lock_holder(path);
 }
 
+const char *store_notice(const struct store *s)
+{
+    return s->notice;
+}
+
 const char *store_path(const struct store *s)
 {
     return s->path;
 }
 
 // --- a new file ----------------------------------------------------------------------------------
-
-// Renames without replacing, also where the file system has no such rename.
-static int publish(const char *temporary, const char *path)
-{
-    if (renameat2(AT_FDCWD, temporary, AT_FDCWD, path, RENAME_NOREPLACE) == 0)
-        return 0;
-    if (errno != EINVAL && errno != ENOSYS)
-        return -1;
-    return link(temporary, path) == 0 ? unlink(temporary) : -1;
-}
-
-static int sync_folder(const char *path)
-{
-    char folder[512];
-    const char *slash = strrchr(path, '/');
-    snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1,
-             slash ? path : ".");
-    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    int rc = fd < 0 ? -1 : fsync(fd);
-    if (fd >= 0)
-        close(fd);
-    return rc;
-}
 
 static int write_file(const char *path, const struct store_new *what, struct gon_error *err)
 {
@@ -365,11 +374,11 @@ int store_create(const char *path, const struct store_new *what, struct store **
         return rc;
     unlink(temporary); // of a process that had our number and died
     rc = write_file(temporary, what, err);
-    if (rc >= 0 && publish(temporary, path) < 0)
+    if (rc >= 0 && store_file_publish(temporary, path) < 0)
         rc = errno == EEXIST
                  ? gon_fail(err, GON_E_REFUSED, "%s: there already; nothing was changed", path)
                  : gon_fail(err, GON_E_STORE, "%s: %s", path, strerror(errno));
-    else if (rc >= 0 && sync_folder(path) < 0)
+    else if (rc >= 0 && store_file_sync_folder(path) < 0)
         rc = gon_fail(err, GON_E_STORE, "the folder of %s: %s", path, strerror(errno));
     unlink(temporary);
     return rc >= 0 ? store_open(path, STORE_WRITE, ret_store, err) : rc;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A campaign is one SQLite file: plan, configuration and bench as they were, every reading with
-// every attempt, reductions, fits, events. Readings are added, never changed. Acknowledged means
+// A campaign is one SQLite file: plan, configuration, bench and the instruments' profiles as they
+// were, every reading with every attempt, reductions, fits, events. Readings are added, never changed. Acknowledged means
 // committed.
 //
 // While it is written: WAL, synchronous=FULL, a commit a call. Closed: a single file. One writer at
 // a time, held by a lock on "FILE-lock" beside it, which names its process; readers never wait for
-// it. A struct store belongs to one thread; several may be open on one file.
+// it. "FILE-reserve" is room on the disk: when that is full, readings are refused until there is
+// room again, while events and states are still written. A struct store belongs to one thread; several may be open on one file.
 //
 // Errors: GON_E_STORE, the file or its disk (full, I/O, busy, moved, damaged: the text says which
 // and what to do); after one the same call may be repeated. GON_E_REFUSED: in use by another
@@ -17,7 +18,11 @@
 //   signal_v, signal_sd_v, monitor_v, monitor_sd_v (NULL is the quiet NaN 0x7ff8000000000000);
 //   int32 count, range; uint32 flags.
 // A row that fails it is an error that names sweep and point, whenever it is read. The plan, the
-// configuration and the bench have one check value each (meta: plan_crc32c, ...).
+// configuration and the bench have one check value each (meta: plan_crc32c, ...), a profile that of
+// int64 t_utc_ms and of name, role and text with their final NULs.
+//
+// A file of an older version is read as it is; opened for writing it becomes one of this version
+// (store_migrate.c), after a copy of it was put beside it.
 #pragma once
 #include "base/err.h"
 #include "campaign/config.h"
@@ -74,6 +79,18 @@ struct store_event {
     const char *text; // borrowed for the call
 };
 
+// An instrument's profile (gonio-profile(5)), which this layer keeps and does not read.
+struct store_profile {
+    const char *name; // as the bench has it
+    const char *role; // "laser", "detector", "axis", ...
+    const char *text; // the file
+};
+
+struct store_kept_profile {
+    int64_t id, t_utc_ms; // since when; until the next of that name
+    struct store_profile profile; // borrowed for the call
+};
+
 struct store_new {
     const struct campaign_config *config;
     const char *config_text, *config_name; // the file as it was read, and its name
@@ -81,6 +98,8 @@ struct store_new {
     const char *bench_text;
     const struct plan *plan;
     int64_t t_utc_ms;
+    const struct store_profile *profiles; // of all that the bench names
+    int profiles_count;
 };
 
 // A new file, open for writing; GON_E_REFUSED when there is one already. Nothing is left when it
@@ -93,6 +112,10 @@ int store_open(const char *path, enum store_mode mode, struct store **ret_store,
 // Makes it a single file. The store is gone in any case; GON_E_STORE when the last checkpoint
 // failed, which loses nothing. NULL is fine.
 int store_close(struct store *s, struct gon_error *err);
+
+// What opening it for writing did that should be told (a file of an older version was changed), ""
+// otherwise; one sentence, the store's own.
+const char *store_notice(const struct store *s);
 
 // How long somebody else's write lock on the file is waited for: 8000 ms unless said otherwise
 // here.
@@ -110,6 +133,9 @@ int store_append_event(struct store *s, int64_t t_utc_ms, const char *level, con
 // A run's state ("running", "paused", "stopped", "done", "failed") and why; a history.
 int store_append_state(struct store *s, int64_t t_utc_ms, const char *state, const char *why,
                        struct gon_error *err);
+// Those that are not there yet, or not with this text as the newest of their name; one commit.
+int store_append_profiles(struct store *s, int64_t t_utc_ms, const struct store_profile *profiles,
+                          int count, struct gon_error *err);
 int store_append_reduction(struct store *s, int64_t t_utc_ms, const struct reduction *r,
                            int64_t *ret_id, struct gon_error *err);
 int store_append_fit(struct store *s, int64_t t_utc_ms, const struct fit_record *f, int64_t *ret_id,
@@ -127,6 +153,11 @@ int store_read_progress(struct store *s, struct store_progress *ret_progress,
                         struct gon_error *err);
 int store_read_config(struct store *s, struct campaign_config *ret_config, struct gon_error *err);
 int store_read_bench(struct store *s, struct bench_config *ret_bench, struct gon_error *err);
+// The profiles in the order in which they were kept, until each returns false; files before version
+// 3 have none. Returns how many were shown; GON_E_STORE for one whose check value is wrong.
+int store_each_profile(struct store *s,
+                       bool (*each)(void *ctx, const struct store_kept_profile *p), void *ctx,
+                       struct gon_error *err);
 // A text of meta ("name", "sample", "created_utc_ms", "config", "bench", "gonio_version", ...);
 // free it. NULL: no such key, or it cannot be read.
 char *store_read_meta(struct store *s, const char *key);

@@ -2,6 +2,7 @@
 #include "campaign/fitjson.h"
 #include "campaign/reduce.h"
 #include "campaign/store_db.h"
+#include "campaign/store_reserve.h"
 #include "campaign/store_row.h"
 
 #include <stdio.h>
@@ -51,12 +52,11 @@ static void bind_reading(sqlite3_stmt *q, const struct store_reading *r)
     sqlite3_bind_int64(q, 14, store_row_crc(r));
 }
 
-int store_append_reading(struct store *s, const struct store_reading *r, struct gon_error *err)
+// A row that is there already is compared.
+static int insert_reading(struct store *s, const struct store_reading *r, struct gon_error *err)
 {
     sqlite3_stmt *q;
-    int rc = store_row_check(r, err);
-    if (rc >= 0)
-        rc = store_db_ready(s, err);
+    int rc = store_db_ready(s, err);
     if (rc >= 0)
         rc = store_db_prepare(
             s,
@@ -77,6 +77,24 @@ int store_append_reading(struct store *s, const struct store_reading *r, struct 
     if (rc >= 0 && !there)
         s->rows++;
     return there ? compare(s, r, err) : rc;
+}
+
+int store_append_reading(struct store *s, const struct store_reading *r, struct gon_error *err)
+{
+    int rc = store_row_check(r, err);
+    if (rc >= 0 && s->mode == STORE_WRITE && s->full && !store_reserve_take(s->path))
+        rc = gon_fail(err, GON_E_STORE,
+                      "%s: the disk is full; free %d MB on it, then it goes on by itself", s->path,
+                      2 * STORE_RESERVE_BYTES >> 20);
+    if (rc < 0)
+        return rc;
+    s->full = false;
+    rc = insert_reading(s, r, err);
+    // The reserve has room for it. It is safe then, but the run must pause: it is acknowledged when
+    // it is offered again and the reserve is back.
+    if (rc < 0 && s->full)
+        insert_reading(s, r, NULL);
+    return rc;
 }
 
 // --- what happened -------------------------------------------------------------------------------

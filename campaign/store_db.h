@@ -9,8 +9,8 @@
 
 enum {
     STORE_APPLICATION = 0x676f6e69, // "goni"
-    STORE_VERSION = 2,
-    STORE_VERSION_ONE_STATE = 1, // of files whose points are all of one state of polarisation
+    STORE_VERSION = 3,
+    STORE_VERSION_PROFILES = 3, // the first that keeps profiles
     STORE_PATIENCE_MS = 8000
 };
 
@@ -21,8 +21,11 @@ struct store {
     char path[512];
     struct store_watch file, wal; // as they were opened
     int64_t rows;                 // readings that were acknowledged, or there when it was opened
+    bool full;   // the disk: the reserve is given away, no reading until it is back
     bool broken; // after an I/O error nothing that SQLite remembers can be trusted: reopen first
     int patience_ms;
+    int version; // of the file
+    char notice[700];
 };
 
 // The error for SQLite's last complaint, with the file and what to do.
@@ -43,9 +46,31 @@ void store_db_bind_text(sqlite3_stmt *statement, int index,
                         const char *text); // NULL: NULL; must outlive it
 
 // campaign/store_schema.c
-extern const char store_schema_sql[];
+extern const char store_schema_sql[], store_profile_sql[];
 // Check value of the whole plan, which meta keeps as plan_crc32c (8 hexadecimal digits): CRC-32C of
 // every column of every row in order; integers and reals as 8 little-endian bytes, texts with their
 // final NUL.
 int store_plan_crc(struct store *s, uint32_t *ret_crc, struct gon_error *err);
+// GON_E_STORE: not as meta says.
+int store_check_plan(struct store *s, struct gon_error *err);
 int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err);
+
+// campaign/store_read.c: a row of these columns.
+#define STORE_READING_COLUMNS                                                                      \
+    "sweep, point, attempt, t_utc_ms, theta_i_udeg, theta_r_udeg, signal_v, signal_sd_v,"          \
+    " monitor_v, monitor_sd_v, samples, detector_range, flags, crc32c"
+enum { STORE_READING_CRC = 13 };
+struct store_reading store_db_reading(sqlite3_stmt *q);
+
+// campaign/store_profiles.c: of its columns without the last; and, within a transaction:
+uint32_t store_profile_crc(int64_t t_utc_ms, const struct store_profile *p);
+int store_put_profile(struct store *s, int64_t t_utc_ms, const struct store_profile *p,
+                      struct gon_error *err);
+
+// campaign/store_migrate.c: a file of an older version becomes one of this version, a transaction a
+// step, after a copy of it was made ("FILE.v1-backup"). s->notice says so.
+int store_migrate(struct store *s, struct gon_error *err);
+
+// campaign/store_copy.c: the file as it is in one moment, complete and on the disk, under a name
+// that must be free.
+int store_copy(struct store *s, const char *path, struct gon_error *err);

@@ -55,15 +55,14 @@ static int open_locked(const char *path, int *ret_holder)
     return -1;
 }
 
-int store_lock_take(struct store_lock *lock, const char *file, struct gon_error *err)
+// What lock->path says.
+static int take(struct store_lock *lock, const char *what, struct gon_error *err)
 {
     char pid[24];
     int holder = 0;
-    if (lock_path(file, lock->path, sizeof lock->path) < 0)
-        return gon_fail(err, GON_E_INPUT, "%.80s...: the path is too long", file);
     lock->fd = open_locked(lock->path, &holder);
     if (lock->fd < 0 && errno == EAGAIN)
-        return gon_fail(err, GON_E_REFUSED, "%s: in use by process %d", file, holder);
+        return gon_fail(err, GON_E_REFUSED, "%s: in use by process %d", what, holder);
     if (lock->fd < 0)
         return gon_fail(err, GON_E_STORE, "%s: %s", lock->path, strerror(errno));
     snprintf(pid, sizeof pid, "%d\n", (int)getpid());
@@ -73,6 +72,24 @@ int store_lock_take(struct store_lock *lock, const char *file, struct gon_error 
         return GON_E_STORE;
     }
     return GON_OK;
+}
+
+int store_lock_take(struct store_lock *lock, const char *file, struct gon_error *err)
+{
+    lock->fd = -1;
+    if (lock_path(file, lock->path, sizeof lock->path) < 0)
+        return gon_fail(err, GON_E_INPUT, "%.80s...: the path is too long", file);
+    return take(lock, file, err);
+}
+
+int store_lock_take_folder(struct store_lock *lock, const char *folder, struct gon_error *err)
+{
+    lock->fd = -1;
+    if (snprintf(lock->path, sizeof lock->path, "%s/.goniod.lock", folder) >=
+        (int)sizeof lock->path)
+        return gon_fail(err, GON_E_INPUT, "%.80s...: the path is too long", folder);
+    int rc = store_lock_local(lock->path, err);
+    return rc < 0 ? rc : take(lock, folder, err);
 }
 
 void store_lock_drop(struct store_lock *lock)

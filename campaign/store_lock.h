@@ -16,6 +16,8 @@ struct store_lock {
 
 int store_lock_take(struct store_lock *lock, const char *file,
                     struct gon_error *err);    // GON_E_REFUSED: held
+// "FOLDER/.goniod.lock" in the same way; also refused on a network file system.
+int store_lock_take_folder(struct store_lock *lock, const char *folder, struct gon_error *err);
 void store_lock_drop(struct store_lock *lock); // and removes the file
 int store_lock_holder(const char *file);       // pid; 0: none
 

@@ -90,7 +90,7 @@ static void mark_done(struct plan *p, const struct store_reading *rows, int coun
     }
 }
 
-static int check_plan(struct store *s, struct gon_error *err)
+int store_check_plan(struct store *s, struct gon_error *err)
 {
     uint32_t crc;
     char text[16];
@@ -112,7 +112,7 @@ int store_read_plan(struct store *s, struct plan *ret_plan, struct gon_error *er
 {
     struct plan p = {.duration_s = (double)NAN};
     struct store_reading *rows = NULL;
-    int rc = check_plan(s, err);
+    int rc = store_check_plan(s, err);
     if (rc >= 0)
         rc = read_points(s, &p, err);
     if (rc >= 0 && p.count == 0)
@@ -157,7 +157,7 @@ int store_read_progress(struct store *s, struct store_progress *ret_progress, st
 
 // --- readings ------------------------------------------------------------------------------------
 
-static struct store_reading reading_of(sqlite3_stmt *q)
+struct store_reading store_db_reading(sqlite3_stmt *q)
 {
     return (struct store_reading){
         .sweep = sqlite3_column_int(q, 0),
@@ -190,8 +190,8 @@ static int read_rows(struct store *s, sqlite3_stmt *q, struct store_reading **ro
             room = room * 2 + 1024;
         }
         struct store_reading *r = &(*rows)[count++];
-        *r = reading_of(q);
-        if (sqlite3_column_int64(q, 13) != store_row_crc(r))
+        *r = store_db_reading(q);
+        if (sqlite3_column_int64(q, STORE_READING_CRC) != store_row_crc(r))
             return gon_fail(err, GON_E_STORE,
                             "%s: sweep %d, point %d, attempt %d is damaged (its check value is "
                             "wrong); restore the file "
@@ -206,12 +206,11 @@ int store_read_readings(struct store *s, int sweep, struct store_reading **ret_r
 {
     sqlite3_stmt *q;
     struct store_reading *rows = NULL;
-    int rc = store_db_prepare(
-        s,
-        "SELECT sweep, point, attempt, t_utc_ms, theta_i_udeg, theta_r_udeg, signal_v,"
-        " signal_sd_v, monitor_v, monitor_sd_v, samples, detector_range, flags, crc32c"
-        " FROM reading WHERE ?1 < 0 OR sweep = ?1 ORDER BY sweep, point, attempt",
-        &q, err);
+    int rc =
+        store_db_prepare(s,
+                         "SELECT " STORE_READING_COLUMNS
+                         " FROM reading WHERE ?1 < 0 OR sweep = ?1 ORDER BY sweep, point, attempt",
+                         &q, err);
     if (rc < 0)
         return rc;
     sqlite3_bind_int(q, 1, sweep);

@@ -19,6 +19,14 @@
     "CREATE TRIGGER " table "_" what " BEFORE " what " ON " table \
     " BEGIN SELECT RAISE(ABORT, '" text "'); END;"
 
+#define PROFILE_TABLE \
+    "CREATE TABLE profile (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL, name TEXT NOT NULL," \
+    " role TEXT NOT NULL, text TEXT NOT NULL, crc32c INTEGER NOT NULL);" \
+    NEVER("UPDATE", "profile", "profiles are never changed") \
+    NEVER("DELETE", "profile", "profiles are never removed")
+
+const char store_profile_sql[] = PROFILE_TABLE;
+
 const char store_schema_sql[] =
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value) WITHOUT ROWID;"
 
@@ -34,6 +42,8 @@ const char store_schema_sql[] =
     " crc32c INTEGER NOT NULL, PRIMARY KEY (sweep, point, attempt)) WITHOUT ROWID;"
     NEVER("UPDATE", "reading", "readings are never changed")
     NEVER("DELETE", "reading", "readings are never removed")
+
+    PROFILE_TABLE
 
     "CREATE TABLE event (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL, level TEXT NOT NULL,"
     " source TEXT NOT NULL, text TEXT NOT NULL);"
@@ -226,21 +236,11 @@ static int put_plan(struct store *s, const struct store_new *what, struct gon_er
     return rc >= 0 ? put_text(s, "plan_crc32c", text, err) : rc;
 }
 
-// A gonio that reads version 1 only would take all beams for one state's.
-static int version_of(const struct plan *plan)
-{
-    for (int i = 1; i < plan->count; i++)
-        if (plan->points[i].pol_in != plan->points[0].pol_in ||
-            plan->points[i].pol_out != plan->points[0].pol_out)
-            return STORE_VERSION;
-    return STORE_VERSION_ONE_STATE;
-}
-
 int store_write_new(struct store *s, const struct store_new *what, struct gon_error *err)
 {
     char pragmas[120];
     snprintf(pragmas, sizeof pragmas, "PRAGMA application_id = %d; PRAGMA user_version = %d;",
-             STORE_APPLICATION, version_of(what->plan));
+             STORE_APPLICATION, STORE_VERSION);
     int rc = store_db_begin(s, err);
     if (rc < 0)
         return rc;
@@ -251,5 +251,7 @@ int store_write_new(struct store *s, const struct store_new *what, struct gon_er
         rc = put_meta(s, what, err);
     if (rc >= 0)
         rc = put_plan(s, what, err);
+    for (int i = 0; i < what->profiles_count && rc >= 0; i++)
+        rc = store_put_profile(s, what->t_utc_ms, &what->profiles[i], err);
     return store_db_end(s, rc, err);
 }

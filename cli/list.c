@@ -32,15 +32,6 @@ static json_t *utc(int64_t ms)
     return json_string(text);
 }
 
-static void local(int64_t ms, char *text, size_t size)
-{
-    time_t s = (time_t)(ms / 1000);
-    struct tm tm;
-    *text = 0;
-    if (ms > 0 && localtime_r(&s, &tm))
-        strftime(text, size, "%Y-%m-%d %H:%M", &tm);
-}
-
 static void print_json(const struct catalog_entry *e, int count)
 {
     json_t *all = json_array();
@@ -69,8 +60,8 @@ static void print_table(const struct catalog_entry *e, int count)
     table_right(t, 2);
     for (int i = 0; i < count; i++, e++) {
         char created[40], finished[40];
-        local(e->created_utc_ms, created, sizeof created);
-        local(e->finished_utc_ms, finished, sizeof finished);
+        out_local(e->created_utc_ms, created, sizeof created);
+        out_local(e->finished_utc_ms, finished, sizeof finished);
         table_cell(t, "%d", e->id);
         table_cell(t, "%s", e->state);
         table_cell(t, "%d/%d", e->done, e->total);

@@ -9,6 +9,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -63,6 +64,15 @@ void out_warn(const char *fmt, ...)
     va_start(ap, fmt);
     say("warning: ", OUT_YELLOW, fmt, ap);
     va_end(ap);
+}
+
+void out_local(int64_t ms, char *text, size_t size)
+{
+    time_t s = (time_t)(ms / 1000);
+    struct tm tm;
+    *text = 0;
+    if (ms > 0 && localtime_r(&s, &tm))
+        strftime(text, size, "%Y-%m-%d %H:%M", &tm);
 }
 
 void out_value(char *text, size_t size, double value, double u)

@@ -6,6 +6,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 struct json_t; // of jansson
@@ -27,6 +28,8 @@ void out_value(char *text, size_t size, double value, double u);
 
 // A time to go by: "40 s", "12 min", "3 h 05 min"; finite.
 void out_duration(char *text, size_t size, double s);
+// "2026-11-26 14:05" where we are; "" for 0.
+void out_local(int64_t utc_ms, char *text, size_t size);
 
 // Says the error and returns the exit status that its code stands for.
 int out_fail(const struct gon_error *err);

@@ -4,6 +4,7 @@
 #include "campaign/reduce.h"
 #include "cli/fitview.h"
 #include "cli/out.h"
+#include "cli/show_profiles.h"
 #include "cli/verb.h"
 
 #include <jansson.h>
@@ -17,11 +18,17 @@ struct options {
     bool json;
     const char *dir;
     long sweep;
+    bool profiles;
+    const char *profile;
 };
 
 static const struct option_row rows[] = {
     {"--sweep", OPTION_INT, offsetof(struct options, sweep), "N", 0, 1000,
      "the readings of sweep N; 0 and the last are the references"},
+    {"--profiles", OPTION_FLAG, offsetof(struct options, profiles), NULL, 0, 0,
+     "the instruments' profiles that are kept in it"},
+    {"--profile", OPTION_TEXT, offsetof(struct options, profile), "NAME", 0, 0,
+     "the text of one: the newest of that name, or of a number that --profiles shows"},
     {"--dir", OPTION_TEXT, offsetof(struct options, dir), "DIR", 0, 0,
      "the folder of campaigns ($GONIO_DIR)"},
     {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
@@ -38,19 +45,25 @@ struct campaign {
     char no_reduction[480];
 };
 
+static int open_file(const char *dir, const char *file, struct store **ret_store,
+                     struct gon_error *err)
+{
+    char directory[CATALOG_PATH], path[CATALOG_PATH];
+    int rc = catalog_directory(dir, directory, sizeof directory, err);
+    rc = rc < 0 ? rc : catalog_resolve(directory, file, path, sizeof path, err);
+    return rc < 0 ? rc : store_open(path, STORE_READ, ret_store, err);
+}
+
 static int campaign_open(struct campaign *c, const char *dir, const char *file,
                          struct gon_error *err)
 {
-    char directory[CATALOG_PATH], path[CATALOG_PATH];
     struct gon_error why;
-    int rc = catalog_directory(dir, directory, sizeof directory, err);
-    rc = rc < 0 ? rc : catalog_resolve(directory, file, path, sizeof path, err);
-    rc = rc < 0 ? rc : store_open(path, STORE_READ, &c->store, err);
+    int rc = open_file(dir, file, &c->store, err);
     rc = rc < 0 ? rc : store_read_progress(c->store, &c->progress, err);
     rc = rc < 0 ? rc : store_read_plan(c->store, &c->plan, err);
     if (rc < 0)
         return rc;
-    catalog_read(path, &c->entry);
+    catalog_read(store_path(c->store), &c->entry);
     c->reduced = reduce_campaign(c->store, &c->reduction, &why) >= 0;
     if (!c->reduced)
         snprintf(c->no_reduction, sizeof c->no_reduction, "%s", why.text);
@@ -250,6 +263,20 @@ static void print_description(const struct campaign *c, const json_t *o)
         out_say("no fit stored yet; fit what is there: gonio fit %s", e->path);
 }
 
+// Nothing else of the file need be whole.
+static int show_kept(const struct options *o, const char *file)
+{
+    struct store *store = NULL;
+    struct gon_error err;
+    int rc = open_file(o->dir, file, &store, &err);
+    if (rc >= 0 && o->profile)
+        rc = show_profile(store, o->profile, o->json, &err);
+    else if (rc >= 0)
+        rc = show_profiles(store, o->json, &err);
+    store_close(store, NULL);
+    return rc < 0 ? out_fail(&err) : EXIT_OK;
+}
+
 static int run_show(const struct verb *verb, int argc, char **argv)
 {
     struct options o = {.sweep = -1};
@@ -259,6 +286,8 @@ static int run_show(const struct verb *verb, int argc, char **argv)
     int status = EXIT_OK;
     if (verb_take(verb, argc, argv, &o, &file, 1, 1) < 0)
         return EXIT_INPUT;
+    if (o.profiles || o.profile)
+        return show_kept(&o, file);
     if (campaign_open(&c, o.dir, file, &err) < 0) {
         status = out_fail(&err);
     } else if (o.sweep >= 0) {
@@ -282,6 +311,8 @@ const struct verb verb_show = {"show",
                                "shows. With --sweep N its readings as a\n"
                                "table: angles from the encoders, f_r with its uncorrelated (u_a) "
                                "and common (u_b) uncertainty, raw\n"
-                               "voltages, every attempt with its flags.\n",
+                               "voltages, every attempt with its flags. --profiles lists the "
+                               "instruments' profiles that the file keeps, since when each was "
+                               "used; --profile NAME prints one as it was read.\n",
                                rows,
                                run_show};

@@ -585,9 +585,9 @@ static void mail_arrived(void *ctx)
 
 static int start_workers(struct hub *h, struct gon_error *err)
 {
-    struct storer_links s = {
-        clk_system(), h->options.bench, h->options.bench_text, h->options.directory, h->store_box,
-        h->box,       h->run_box};
+    struct storer_links s = {clk_system(),         h->options.bench,    h->options.bench_text,
+                             h->options.directory, h->store_box,        h->box,
+                             h->run_box,           h->options.profiles, h->options.profiles_count};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
     struct runner_links r = {h->options.bench, h->cancel, h->run_box, h->box, h->store_box};
     int rc = storer_start(&s, &h->storer, err);

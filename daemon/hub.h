@@ -15,11 +15,14 @@
 struct bench_config;
 struct hub;
 struct log;
+struct store_profile;
 struct loop;
 
 struct hub_options {
     const struct bench_config *bench; // borrowed for the hub's life
     const char *bench_text; // as read, for the campaign files
+    const struct store_profile *profiles; // likewise, borrowed
+    int profiles_count;
     const char *directory;               // of the campaign files
     bool simulator;
     long seed;

@@ -11,6 +11,7 @@
 #include "daemon/hub.h"
 #include "daemon/listener.h"
 #include "daemon/loop.h"
+#include "daemon/profile_texts.h"
 #include "daemon/service.h"
 #include "daemon/simulator.h"
 
@@ -65,7 +66,9 @@ struct daemon {
     struct simulator *simulator;
     struct bench_config bench;
     char *bench_text;
+    struct profile_texts profiles;
     char socket[200], directory[4096];
+    struct catalog_hold *hold; // of the directory
     struct hub *hub;
     struct deadline *deadline; // NULL: not ending yet
     bool dark;                 // the laser, when the bench was last looked at
@@ -264,7 +267,7 @@ static int open_bench(struct daemon *d, struct gon_error *err)
     if (bench_config_load(path, (struct cfg_sink){say_line, NULL}, &d->bench, &d->bench_text) < 0)
         return gon_fail(err, GON_E_INPUT, "%s: mend the bench file; see: gonio check %s", path,
                         path);
-    return GON_OK;
+    return profile_texts_read(&d->bench, &d->profiles, err);
 }
 
 static int open_places(struct daemon *d, struct gon_error *err)
@@ -272,6 +275,9 @@ static int open_places(struct daemon *d, struct gon_error *err)
     const char *dir = d->options.dir ? d->options.dir : d->bench.directory;
     int rc = catalog_directory(dir, d->directory, sizeof d->directory, err);
     rc = rc < 0 ? rc : catalog_make_directory(d->directory, err);
+    rc = rc < 0 ? rc : catalog_take(d->directory, &d->hold, err);
+    if (rc == GON_E_REFUSED)
+        gon_prefix(err, "campaigns cannot be kept there; choose another folder with --dir");
     return rc;
 }
 
@@ -303,6 +309,8 @@ static int open_hub(struct daemon *d, struct gon_error *err)
     struct hub_options o = {
         .bench = &d->bench,
         .bench_text = d->bench_text,
+        .profiles = d->profiles.profile,
+        .profiles_count = d->profiles.count,
         .directory = d->directory,
         .simulator = d->simulator != NULL,
         .seed = d->options.seed,
@@ -347,8 +355,10 @@ static int run(struct daemon *d)
     }
     loop_free(d->loop);
     simulator_stop(d->simulator);
+    catalog_drop(d->hold);
     listener_close(d->listener);
     service_close(d->service);
+    profile_texts_free(&d->profiles);
     free(d->bench_text);
     return d->status;
 }

@@ -155,8 +155,9 @@ static int create_file(struct storer *s, const struct campaign_config *config, c
         plan_clear(&plan);
         return rc;
     }
-    struct store_new what = {config, n->text,  n->name, s->links.bench, s->links.bench_text,
-                             &plan,  utc_ms(s)};
+    struct store_new what = {
+        config, n->text,   n->name,           s->links.bench,         s->links.bench_text,
+        &plan,  utc_ms(s), s->links.profiles, s->links.profiles_count};
     rc = catalog_create(s->links.directory, s->highest, &what, &store, &id, err);
     if (rc == 0)
         snprintf(ret_path, size, "%s", store_path(store));
@@ -272,6 +273,16 @@ static int read_material(const struct storer *s, struct store *store, struct run
     return rc < 0 ? rc : read_opening(store, m, err);
 }
 
+// What was measured with from now on, and what opening the file did to it.
+static int keep_today(const struct storer *s, struct store *store, struct gon_error *err)
+{
+    const char *notice = store_notice(store);
+    int rc =
+        store_append_profiles(store, utc_ms(s), s->links.profiles, s->links.profiles_count, err);
+    return rc >= 0 && *notice ? store_append_event(store, utc_ms(s), "notice", "store", notice, err)
+                              : rc;
+}
+
 static int open_file(const struct storer *s, const char *path, struct store **ret_store,
                      struct run_material **ret_material, struct gon_error *err)
 {
@@ -280,6 +291,7 @@ static int open_file(const struct storer *s, const char *path, struct store **re
     int rc = m ? store_open(path, STORE_WRITE, &store, err)
                : gon_fail(err, GON_E_SYSTEM, "store: out of memory");
     rc = rc < 0 ? rc : read_material(s, store, m, err);
+    rc = rc < 0 ? rc : keep_today(s, store, err);
     if (rc < 0) {
         store_close(store, NULL);
         run_material_free(m);

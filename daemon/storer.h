@@ -10,6 +10,7 @@ struct bench_config;
 struct clk;
 struct mail;
 struct note;
+struct store_profile;
 struct storer;
 
 struct storer_links { // all borrowed for the storer's life
@@ -19,6 +20,8 @@ struct storer_links { // all borrowed for the storer's life
     const char *directory;  // where new campaigns go
     struct mail *box;       // the thread's own
     struct mail *to_main, *to_runner;
+    const struct store_profile *profiles; // that the bench names, as read, for the campaign files
+    int profiles_count;
 };
 
 struct storer *storer_new(const struct storer_links *links); // the core; NULL without memory

@@ -194,6 +194,7 @@ def short_folder(of):
 
 class Daemon(Program):
     """goniod with its socket and campaigns in a folder; bench: arguments that name it."""
+    wrap = ()  # what runs it
 
     def __init__(self, folder, *bench, env=None, ready=True):
         self.folder = pathlib.Path(folder)
@@ -204,7 +205,7 @@ class Daemon(Program):
         self.directory.mkdir(exist_ok=True)
         self.env = {"GONIO_SOCKET": str(self.socket), "GONIO_DIR": str(self.directory),
                     "XDG_RUNTIME_DIR": str(self.runtime), **(env or {})}
-        super().__init__([BUILD / "goniod", *(bench or ("--sim", "--fast"))], self.folder / "goniod.log",
+        super().__init__([*self.wrap, BUILD / "goniod", *(bench or ("--sim", "--fast"))], self.folder / "goniod.log",
                          self.env)
         if ready:
             self.wait_line("ready")

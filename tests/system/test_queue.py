@@ -105,10 +105,3 @@ def test_it_outlives_goniod_and_waits_for_a_person(start_daemon, tmp_path, start
     assert order(d) == [b], "held still"
     assert d.gonio("resume", b).returncode == 0
     assert order(d) == []
-
-
-def test_a_second_daemon_on_the_folder_is_refused(start_daemon, tmp_path):
-    d = start_daemon(folder=tmp_path / "a")
-    other = start_daemon(folder=tmp_path / "b", env={"GONIO_DIR": str(d.directory)}, ready=False)
-    assert other.process.wait(20) == 4
-    assert f"state.db: in use by process {d.pid}" in other.errors()

@@ -39,7 +39,7 @@ static struct store *created_above(int above, const char *name, int *ret_id)
     struct plan plan;
     struct store *s = NULL;
     assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
-    const struct store_new what = {&config, text, "c.cfg", &bench, FIXTURE_BENCH, &plan, 1000};
+    const struct store_new what = {&config, text, "c.cfg", &bench, FIXTURE_BENCH, &plan, 1000, NULL, 0};
     assert_int_equal(catalog_create(folder.path, above, &what, &s, ret_id, NULL), 0);
     plan_clear(&plan);
     return s;

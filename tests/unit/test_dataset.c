@@ -414,7 +414,7 @@ static struct store *measured_with(const struct fixture_folder *folder, const ch
     struct plan plan;
     struct store *s;
     assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
-    const struct store_new what = {&config, text, "c.cfg", &bench, bench_text, &plan, 1};
+    const struct store_new what = {&config, text, "c.cfg", &bench, bench_text, &plan, 1, NULL, 0};
     assert_int_equal(
         store_create(fixture_path(folder, "0001-a.gonio", file, sizeof file), &what, &s, NULL), 0);
     for (int i = 0; i < plan.count; i++) {

@@ -129,7 +129,7 @@ static struct store *stored(struct setting *s)
     struct store *store;
     struct gon_error err = {0};
     const struct store_new what = {&r->config,    s->campaign, "c.cfg", &r->bench,
-                                   s->bench_text, &r->plan,    1};
+                                   s->bench_text, &r->plan,    1,         NULL,     0};
     fixture_path(&s->folder, "0001-a.gonio", s->file, sizeof s->file);
     if (store_create(s->file, &what, &store, &err) < 0)
         fail_msg("%s", err.text);

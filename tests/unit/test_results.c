@@ -48,7 +48,7 @@ static struct store *measured(void)
     struct plan plan;
     struct store *s;
     assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
-    const struct store_new what = {&config, CAMPAIGN, "c.cfg", &bench, FIXTURE_BENCH, &plan, 1};
+    const struct store_new what = {&config, CAMPAIGN, "c.cfg", &bench, FIXTURE_BENCH, &plan, 1, NULL, 0};
     assert_int_equal(store_create(path, &what, &s, NULL), 0);
     for (int i = 0; i < plan.count; i++) {
         const struct plan_point *p = &plan.points[i];

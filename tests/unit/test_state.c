@@ -110,18 +110,6 @@ static void what_cannot_be_written_changes_nothing(void **state)
     state_close(s);
 }
 
-static void one_daemon_a_folder(void **state)
-{
-    struct state *s = open_state(*state), *second;
-    struct gon_error err;
-    char wanted[60];
-    snprintf(wanted, sizeof wanted, "state.db: in use by process %d", (int)getpid());
-    assert_int_equal(state_open(((struct folder *)*state)->path, &second, &err), GON_E_REFUSED);
-    assert_non_null(strstr(err.text, wanted));
-    state_close(s);
-    state_close(open_state(*state));
-}
-
 static void sql(const struct folder *f, const char *text)
 {
     sqlite3 *db;
@@ -170,7 +158,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(the_queue_comes_back_in_its_order),
         TEST(what_cannot_be_written_changes_nothing),
-        TEST(one_daemon_a_folder),
         TEST(a_newer_file_is_refused),
         TEST(what_is_no_state_is_left_alone),
     };

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // uses: campaign fit model base
-#include "campaign_fixture.h"
+#include "store_fixture.h"
 
 #include "base/units.h"
+#include "campaign/catalog.h"
 #include "campaign/reduce.h"
 #include "campaign/store_lock.h"
 #include "campaign/store_row.h"
@@ -18,99 +19,10 @@
 #include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/vfs.h>
 #include <sys/wait.h>
 #include <time.h>
-
-#define CONFIG                                                                                     \
-    "campaign: { name = \"Test paint\"; sample = \"panel 3\"; theta_i_deg = (10, 20, 30);"         \
-    " theta_r: { from_deg = -20; to_deg = 40; step_deg = 10; }; dense: { half_width_deg = 1; }; "  \
-    "};"
-
-static struct fixture_folder folder;
-static char path[128];
-
-static int begin(void **state)
-{
-    (void)state;
-    folder = fixture_folder();
-    fixture_path(&folder, "0001-test.gonio", path, sizeof path);
-    return 0;
-}
-
-static int end(void **state)
-{
-    (void)state;
-    fixture_remove(&folder);
-    return 0;
-}
-
-static struct store *created_from(const char *config_text)
-{
-    const struct campaign_config config = fixture_campaign(config_text);
-    const struct bench_config bench = fixture_bench();
-    struct plan plan;
-    struct store *s = NULL;
-    struct gon_error err = {0};
-    assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
-    const struct store_new what = {&config,       config_text, "test.cfg",   &bench,
-                                   FIXTURE_BENCH, &plan,       1700000000123};
-    assert_int_equal(store_create(path, &what, &s, &err), 0);
-    plan_clear(&plan);
-    return s;
-}
-
-static struct store *created(void)
-{
-    return created_from(CONFIG);
-}
-
-static struct store_reading reading(int sweep, int point, int attempt)
-{
-    return (struct store_reading){.sweep = sweep,
-                                  .point = point,
-                                  .attempt = attempt,
-                                  .t_utc_ms = 1700000001000 + point,
-                                  .theta_i_udeg = 10000300,
-                                  .theta_r_udeg = -20000100,
-                                  .signal_v = 1.23456789e-3,
-                                  .signal_sd_v = 1.5e-6,
-                                  .monitor_v = 1.001,
-                                  .monitor_sd_v = 2e-4,
-                                  .count = 4,
-                                  .range = 7};
-}
-
-static void append(struct store *s, const struct store_reading *r)
-{
-    struct gon_error err = {0};
-    int rc = store_append_reading(s, r, &err);
-    if (rc < 0)
-        print_error("%s\n", err.text);
-    assert_int_equal(rc, 0);
-}
-
-static struct store *opened(enum store_mode mode)
-{
-    struct store *s = NULL;
-    struct gon_error err = {0};
-    int rc = store_open(path, mode, &s, &err);
-    if (rc < 0)
-        print_error("%s\n", err.text);
-    assert_int_equal(rc, 0);
-    return s;
-}
-
-// Somebody else at the file, past our code.
-static void tamper(const char *sql)
-{
-    sqlite3 *db;
-    char *why = NULL;
-    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-    if (sqlite3_exec(db, sql, NULL, NULL, &why) != SQLITE_OK)
-        print_error("%s\n", why);
-    assert_null(why);
-    sqlite3_close(db);
-}
 
 static void what_goes_in_comes_out(void **state)
 {
@@ -333,7 +245,8 @@ static void a_new_file_never_replaces_one(void **state)
     struct store *s;
     struct gon_error err;
     assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
-    const struct store_new what = {&config, CONFIG, "test.cfg", &bench, FIXTURE_BENCH, &plan, 1};
+    const struct store_new what = {&config, CONFIG, "test.cfg", &bench, FIXTURE_BENCH,
+                                   &plan,   1,      NULL,       0};
     assert_int_equal(store_create(path, &what, &s, &err), GON_E_REFUSED);
     assert_int_equal(fixture_files(&folder), 1);
     plan_clear(&plan);
@@ -532,26 +445,15 @@ static void other_files_and_newer_ones_are_refused(void **state)
     assert_int_equal(store_open(folder.path, STORE_READ, &s, &err), GON_E_INPUT);
     unlink(path);
     store_close(created(), NULL);
-    tamper("PRAGMA user_version = 3");
+    tamper("PRAGMA user_version = 4");
     assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_REFUSED);
-    assert_non_null(strstr(err.text, "newer"));
+    assert_non_null(strstr(err.text, "version 4 of the file, of a newer gonio"));
+    assert_non_null(strstr(err.text, "install the newer one"));
+    assert_int_equal(store_open(path, STORE_WRITE, &s, NULL), GON_E_REFUSED);
+    assert_int_equal(fixture_files(&folder), 1);
 }
 
-static int64_t number(const char *sql)
-{
-    sqlite3 *db;
-    sqlite3_stmt *q;
-    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-    assert_int_equal(sqlite3_prepare_v2(db, sql, -1, &q, NULL), SQLITE_OK);
-    assert_int_equal(sqlite3_step(q), SQLITE_ROW);
-    const int64_t value = sqlite3_column_int64(q, 0);
-    sqlite3_finalize(q);
-    sqlite3_close(db);
-    return value;
-}
-
-// Only a file of several states is one that an older gonio would misread.
-static void several_states_are_kept_and_make_version_2(void **state)
+static void several_states_are_kept(void **state)
 {
     (void)state;
     static const char states[] =
@@ -561,7 +463,6 @@ static void several_states_are_kept_and_make_version_2(void **state)
     const struct campaign_config c = fixture_campaign(states);
     const struct bench_config bench = fixture_bench();
     store_close(created_from(states), NULL);
-    assert_int_equal(number("PRAGMA user_version"), 2);
     struct store *s = opened(STORE_READ);
     assert_int_equal(plan_make(&c, &bench, &made, NULL), 0);
     assert_int_equal(store_read_plan(s, &kept, NULL), 0);
@@ -575,24 +476,120 @@ static void several_states_are_kept_and_make_version_2(void **state)
     plan_clear(&made);
     plan_clear(&kept);
     store_close(s, NULL);
-    unlink(path);
-    store_close(created(), NULL);
-    assert_int_equal(number("PRAGMA user_version"), 1);
 }
+
+// --- profiles ------------------------------------------------------------------------------------
+
+static const struct store_profile profiles[] = {
+    {"cobolt-05", "laser", "profile: { name = \"cobolt-05\"; };\n# \xc3\xa9t\xc3\xa9\n"},
+    {"oriental-az", "axis", "profile: { name = \"az\"; };\n"},
+};
+
+static bool note_profile(void *ctx, const struct store_kept_profile *p)
+{
+    char *texts = ctx, line[200];
+    snprintf(line, sizeof line, "%d %lld %s %s %s|", (int)p->id, (long long)p->t_utc_ms,
+             p->profile.name, p->profile.role, p->profile.text);
+    strcat(texts, line);
+    return true;
+}
+
+static void profiles_are_kept_with_their_times(void **state)
+{
+    (void)state;
+    char texts[1000] = "", wanted[1000];
+    struct store *s = created();
+    struct store_profile changed = profiles[1];
+    assert_int_equal(store_each_profile(s, note_profile, texts, NULL), 0);
+    assert_int_equal(store_append_profiles(s, 1000, profiles, 2, NULL), 0);
+    assert_int_equal(store_append_profiles(s, 2000, profiles, 2, NULL), 0); // nothing new
+    changed.text = "profile: { name = \"az\"; base = 1; };\n";
+    assert_int_equal(store_append_profiles(s, 3000, &changed, 1, NULL), 0);
+    assert_int_equal(store_append_profiles(s, 4000, profiles, 2, NULL), 0); // back again
+    store_close(s, NULL);
+    s = opened(STORE_READ);
+    assert_int_equal(store_each_profile(s, note_profile, texts, NULL), 4);
+    snprintf(wanted, sizeof wanted,
+             "1 1000 cobolt-05 laser %s|2 1000 oriental-az axis %s|3 3000 oriental-az axis %s|"
+             "4 4000 oriental-az axis %s|",
+             profiles[0].text, profiles[1].text, changed.text, profiles[1].text);
+    assert_string_equal(texts, wanted);
+    store_close(s, NULL);
+}
+
+// Its check value is that of independent code: Python's struct '<q' and a bitwise CRC.
+static void a_changed_profile_is_noticed(void **state)
+{
+    (void)state;
+    static const char *const changes[] = {"text = text || ' '", "role = 'detector'", "name = 'az'",
+                                          "t_utc_ms = t_utc_ms + 1", "crc32c = crc32c + 1"};
+    for (size_t i = 0; i < sizeof changes / sizeof *changes; i++) {
+        char sql[200], texts[1000] = "";
+        struct gon_error err;
+        struct store *s = created();
+        assert_int_equal(store_append_profiles(s, 1000, profiles, 2, NULL), 0);
+        store_close(s, NULL);
+        assert_int_equal(number("SELECT crc32c FROM profile WHERE id = 2"), 0x39e18dca);
+        snprintf(sql, sizeof sql, "DROP TRIGGER profile_UPDATE; UPDATE profile SET %s WHERE id = 2",
+                 changes[i]);
+        tamper(sql);
+        s = opened(STORE_READ);
+        assert_int_equal(store_each_profile(s, note_profile, texts, &err), GON_E_STORE);
+        assert_non_null(strstr(err.text, "the profile 2 ("));
+        assert_non_null(strstr(texts, "cobolt-05")); // what is whole was shown
+        store_close(s, NULL);
+        assert_int_equal(unlink(path), 0);
+    }
+}
+
+static void a_new_file_has_the_profiles_it_was_given(void **state)
+{
+    (void)state;
+    const struct campaign_config config = fixture_campaign(CONFIG);
+    const struct bench_config bench = fixture_bench();
+    struct plan plan;
+    struct store *s;
+    char texts[1000] = "";
+    assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
+    const struct store_new what = {.config = &config,
+                                   .config_text = CONFIG,
+                                   .config_name = "test.cfg",
+                                   .bench = &bench,
+                                   .bench_text = FIXTURE_BENCH,
+                                   .plan = &plan,
+                                   .t_utc_ms = 7,
+                                   .profiles = profiles,
+                                   .profiles_count = 2};
+    assert_int_equal(store_create(path, &what, &s, NULL), 0);
+    assert_int_equal(store_each_profile(s, note_profile, texts, NULL), 2);
+    assert_non_null(strstr(texts, "2 7 oriental-az axis "));
+    store_close(s, NULL);
+    plan_clear(&plan);
+    sqlite3 *db;
+    assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(db, "UPDATE profile SET role = ''", NULL, NULL, NULL),
+                     SQLITE_CONSTRAINT);
+    assert_int_equal(sqlite3_exec(db, "DELETE FROM profile", NULL, NULL, NULL), SQLITE_CONSTRAINT);
+    sqlite3_close(db);
+}
+
+// --- files of older versions ---------------------------------------------------------------------
 
 // Dark 1 mV, beam 2.001 V, signal 1 mV and 1 mV more for each point of the plan.
 static void a_file_of_version_1_is_read_and_written_on(void **state)
 {
     (void)state;
-    char text[16384];
-    FILE *in = fopen("tests/golden/campaign_v1.sql", "r");
-    assert_non_null(in);
-    text[fread(text, 1, sizeof text - 1, in)] = 0;
-    fclose(in);
-    tamper(text);
-    struct store *s = opened(STORE_WRITE);
+    char profile_texts[1000] = "";
+    make_from_sql("tests/golden/campaign_v1.sql");
+    struct store *s = opened(STORE_READ);
     struct plan p;
     struct reduction r;
+    assert_int_equal(store_each_profile(s, note_profile, profile_texts, NULL), 0);
+    assert_int_equal(store_read_plan(s, &p, NULL), 0);
+    store_close(s, NULL);
+    plan_clear(&p);
+    assert_int_equal(number("PRAGMA user_version"), 1); // reading changes nothing
+    s = opened(STORE_WRITE);
     assert_int_equal(store_read_plan(s, &p, NULL), 0);
     assert_true(p.count == 8 && p.sweeps == 2 && p.points[6].done && !p.points[7].done);
     for (int i = 0; i < p.count; i++)
@@ -607,10 +604,97 @@ static void a_file_of_version_1_is_read_and_written_on(void **state)
     assert_int_equal(store_append_reduction(s, 1, &r, NULL, NULL), 0);
     const struct store_reading dark = reading(3, 1, 1);
     append(s, &dark);
+    assert_int_equal(store_append_profiles(s, 5000, profiles, 2, NULL), 0);
+    assert_int_equal(store_each_profile(s, note_profile, profile_texts, NULL), 2);
     reduction_clear(&r);
     plan_clear(&p);
     store_close(s, NULL);
+}
+
+// Rows of a campaign file and of what is kept of its older self.
+static int64_t number_of(const char *file, const char *sql)
+{
+    char ours[sizeof path];
+    strcpy(ours, path);
+    strcpy(path, file);
+    const int64_t value = number(sql);
+    strcpy(path, ours);
+    return value;
+}
+
+static void an_older_file_is_copied_before_it_changes(void **state)
+{
+    (void)state;
+    static const char *const older[] = {"tests/golden/campaign_v1.sql",
+                                        "tests/golden/campaign_v2.sql"};
+    static const int readings[] = {7, 13};
+    for (int version = 1; version <= 2; version++) {
+        char backup[200], second[200];
+        make_from_sql(older[version - 1]);
+        struct store *s = opened(STORE_WRITE);
+        snprintf(backup, sizeof backup, "%s.v%d-backup", path, version);
+        assert_non_null(strstr(store_notice(s), backup));
+        const struct store_reading last = reading(3, version, 1);
+        append(s, &last);
+        store_close(s, NULL);
+        assert_int_equal(number("PRAGMA user_version"), 3);
+        assert_int_equal(number("SELECT count(*) FROM reading"), readings[version - 1] + 1);
+        assert_int_equal(number_of(backup, "PRAGMA user_version"), version);
+        assert_int_equal(number_of(backup, "PRAGMA application_id"), 1735356009);
+        assert_int_equal(number_of(backup, "SELECT count(*) FROM reading"), readings[version - 1]);
+        assert_int_equal(number_of(backup, "SELECT count(*) FROM sqlite_schema WHERE name LIKE"
+                                           " 'profile%'"),
+                         0);
+        assert_int_equal(fixture_files(&folder), 2);
+        s = opened(STORE_WRITE); // a second time there is nothing to do
+        assert_string_equal(store_notice(s), "");
+        store_close(s, NULL);
+        assert_int_equal(fixture_files(&folder), 2);
+        assert_int_equal(rename(backup, path), 0); // somebody goes back, and on again
+        close(open(backup, O_CREAT | O_WRONLY, 0600));
+        s = opened(STORE_WRITE);
+        snprintf(second, sizeof second, "%s.v%d-backup-2", path, version);
+        assert_non_null(strstr(store_notice(s), second));
+        store_close(s, NULL);
+        assert_int_equal(number_of(second, "PRAGMA user_version"), version);
+        assert_int_equal(unlink(path) | unlink(backup) | unlink(second), 0);
+    }
+}
+
+// A step that fails leaves the file as it was, and the copy.
+static void a_step_that_fails_changes_nothing(void **state)
+{
+    (void)state;
+    struct store *s;
+    struct gon_error err;
+    make_from_sql("tests/golden/campaign_v1.sql");
+    tamper("CREATE TABLE profile (x)"); // in its way
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_STORE);
+    assert_non_null(strstr(err.text, "profile"));
+    assert_int_equal(number("PRAGMA user_version"), 2); // step by step: the first had nothing to do
+    tamper("DROP TABLE profile");
+    s = opened(STORE_WRITE);
+    store_close(s, NULL);
+    assert_int_equal(number("PRAGMA user_version"), 3);
+}
+
+static void without_a_copy_nothing_is_changed(void **state)
+{
+    (void)state;
+    struct store *s;
+    struct gon_error err;
+    struct rlimit before, tight;
+    make_from_sql("tests/golden/campaign_v1.sql");
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    tight = before;
+    tight.rlim_cur = 40000; // the file's size is more
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_STORE);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    assert_non_null(strstr(err.text, "backup"));
     assert_int_equal(number("PRAGMA user_version"), 1);
+    store_close(opened(STORE_WRITE), NULL);
 }
 
 static void a_moved_file_is_noticed_at_the_next_reading(void **state)
@@ -839,9 +923,10 @@ static void leave_a_hot_journal(void)
     pid_t child = fork();
     if (child == 0) {
         sqlite3 *db;
-        const char *sql = "PRAGMA cache_size = 5; BEGIN; CREATE TABLE half (x);"
-                          "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000)"
-                          " INSERT INTO half SELECT randomblob(400) FROM n";
+        const char *sql =
+            "PRAGMA cache_size = 5; BEGIN; CREATE TABLE half (x);"
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000)"
+            " INSERT INTO half SELECT randomblob(400) FROM n";
         _exit(sqlite3_open(path, &db) || sqlite3_exec(db, sql, NULL, NULL, NULL));
     }
     int status;
@@ -945,6 +1030,64 @@ static void network_file_systems_are_known(void **state)
     assert_int_equal(store_lock_local(path, NULL), 0);
 }
 
+// Also for the library: what a mounted NFS would answer.
+static long pretended_type;
+
+int statfs(const char *file, struct statfs *ret_fs)
+{
+    const int rc = (int)syscall(SYS_statfs, file, ret_fs);
+    if (rc == 0 && pretended_type)
+        ret_fs->f_type = pretended_type;
+    return rc;
+}
+
+static void nothing_is_written_on_a_network_file_system(void **state)
+{
+    (void)state;
+    struct store *s;
+    struct gon_error err;
+    struct catalog_hold *hold;
+    store_close(created(), NULL);
+    pretended_type = 0x6969;
+    assert_int_equal(store_open(path, STORE_WRITE, &s, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "lies on a network file system"));
+    assert_int_equal(catalog_take(folder.path, &hold, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, "lies on a network file system"));
+    assert_int_equal(store_open(path, STORE_READ, &s, NULL), 0);
+    store_close(s, NULL);
+    assert_int_equal(fixture_files(&folder), 1);
+    assert_int_equal(unlink(path), 0);
+    const struct campaign_config config = fixture_campaign(CONFIG);
+    const struct bench_config bench = fixture_bench();
+    struct plan plan;
+    assert_int_equal(plan_make(&config, &bench, &plan, NULL), 0);
+    const struct store_new what = {&config, CONFIG, "test.cfg", &bench, FIXTURE_BENCH,
+                                   &plan,   1,      NULL,       0};
+    assert_int_equal(store_create(path, &what, &s, &err), GON_E_REFUSED);
+    assert_int_equal(fixture_files(&folder), 0);
+    plan_clear(&plan);
+    pretended_type = 0;
+}
+
+static void a_folder_is_for_one_daemon(void **state)
+{
+    (void)state;
+    struct catalog_hold *hold, *second;
+    struct gon_error err;
+    char mine[40], lock[160];
+    snprintf(mine, sizeof mine, "in use by process %d", (int)getpid());
+    assert_int_equal(catalog_take(folder.path, &hold, NULL), 0);
+    assert_int_equal(catalog_take(folder.path, &second, &err), GON_E_REFUSED);
+    assert_non_null(strstr(err.text, mine));
+    catalog_drop(hold);
+    fixture_path(&folder, ".goniod.lock", lock, sizeof lock);
+    assert_int_equal(access(lock, F_OK), -1);
+    // Of one that was killed.
+    close(open(lock, O_CREAT | O_WRONLY, 0600));
+    assert_int_equal(catalog_take(folder.path, &hold, NULL), 0);
+    catalog_drop(hold);
+}
+
 static void flags_are_words(void **state)
 {
     (void)state;
@@ -975,8 +1118,14 @@ int main(void)
         TEST(a_failed_fsync_reopens_before_the_next_row),
         TEST(readings_cannot_be_changed_by_accident),
         TEST(other_files_and_newer_ones_are_refused),
-        TEST(several_states_are_kept_and_make_version_2),
+        TEST(several_states_are_kept),
+        TEST(profiles_are_kept_with_their_times),
+        TEST(a_changed_profile_is_noticed),
+        TEST(a_new_file_has_the_profiles_it_was_given),
         TEST(a_file_of_version_1_is_read_and_written_on),
+        TEST(an_older_file_is_copied_before_it_changes),
+        TEST(a_step_that_fails_changes_nothing),
+        TEST(without_a_copy_nothing_is_changed),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
         TEST(a_cut_file_is_noticed_at_the_next_reading),
         TEST(a_removed_wal_loses_nothing),
@@ -989,6 +1138,8 @@ int main(void)
         TEST(readings_are_small),
         TEST(events_and_states_are_a_history),
         TEST(network_file_systems_are_known),
+        TEST(nothing_is_written_on_a_network_file_system),
+        TEST(a_folder_is_for_one_daemon),
         TEST(flags_are_words),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -91,7 +91,9 @@ static int set_up(void **state)
                                      w->folder,
                                      w->to_store,
                                      w->to_main,
-                                     w->to_runner};
+                                     w->to_runner,
+                                     NULL,
+                                     0};
     w->storer = storer_new(&w->links);
     struct fitter_links f = {w->cancel, NULL, w->to_main, w->to_store};
     w->fitter = fitter_new(&f);
@@ -241,6 +243,48 @@ static void a_campaign_goes_on_where_it_was_stopped(void **state)
     free(run);
 }
 
+static bool list_profile(void *ctx, const struct store_kept_profile *p)
+{
+    char *texts = ctx;
+    strcat(strcat(strcat(strcat(texts, p->profile.name), "="), p->profile.text), " ");
+    return true;
+}
+
+static bool list_event(void *ctx, const struct store_event *e)
+{
+    char *texts = ctx;
+    strcat(strcat(texts, e->level), ": ");
+    strcat(strcat(texts, e->text), "\n");
+    return true;
+}
+
+// What it is measured with today is kept, too, when a campaign goes on another day.
+static void profiles_are_kept_at_the_beginning_and_when_it_goes_on(void **state)
+{
+    struct world *w = *state;
+    struct store_profile profiles[] = {{"sr830", "detector", "one"}, {"az", "axis", "two"}};
+    struct storer_links links = w->links;
+    char texts[200] = "", events[2000] = "";
+    links.profiles = profiles;
+    links.profiles_count = 2;
+    storer_free(w->storer);
+    w->storer = storer_new(&links);
+    struct run *run = create(w);
+    run_material_free(open_run(w, run));
+    close_run(w, run->id, RUN_STOPPED);
+    profiles[1].text = "three";
+    run_material_free(open_run(w, run));
+    close_run(w, run->id, RUN_STOPPED);
+    struct store *s;
+    assert_int_equal(store_open(run->path, STORE_READ, &s, NULL), 0);
+    assert_int_equal(store_each_profile(s, list_profile, texts, NULL), 3);
+    assert_string_equal(texts, "sr830=one az=two az=three ");
+    store_each_event(s, 0, list_event, events, NULL);
+    assert_string_equal(events, "");
+    store_close(s, NULL);
+    free(run);
+}
+
 static void a_row_offered_again_is_accepted_only_when_it_is_the_same(void **state)
 {
     struct world *w = *state;
@@ -347,23 +391,6 @@ static void the_queue_outlives_the_storer(void **state)
     note_free(expect(w->to_main, NOTE_LISTED));
     free(a);
     free(b);
-}
-
-static void another_daemons_folder_is_refused(void **state)
-{
-    struct world *w = *state;
-    storer_step(w->storer, note_of(NOTE_LIST, 0, NULL, NULL));
-    note_free(expect(w->to_main, NOTE_RESTORED));
-    note_free(expect(w->to_main, NOTE_LISTED));
-    struct storer *second = storer_new(&w->links);
-    storer_step(second, note_of(NOTE_LIST, 0, NULL, NULL));
-    struct note *n = expect(w->to_main, NOTE_UNKEPT);
-    char wanted[60];
-    snprintf(wanted, sizeof wanted, "state.db: in use by process %d", (int)getpid());
-    assert_int_equal(n->err.code, GON_E_REFUSED);
-    assert_non_null(strstr(n->err.text, wanted));
-    note_free(n);
-    storer_free(second);
 }
 
 static void only_files_of_the_own_folder_are_taken(void **state)
@@ -553,12 +580,12 @@ int main(void)
 #define TEST(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         TEST(a_campaign_goes_on_where_it_was_stopped),
+        TEST(profiles_are_kept_at_the_beginning_and_when_it_goes_on),
         TEST(a_row_offered_again_is_accepted_only_when_it_is_the_same),
         TEST(a_wrong_campaign_is_complained_of_line_by_line),
         TEST(another_bench_is_refused),
         TEST(campaigns_are_listed_with_their_states),
         TEST(the_queue_outlives_the_storer),
-        TEST(another_daemons_folder_is_refused),
         TEST(only_files_of_the_own_folder_are_taken),
         TEST(a_number_is_looked_for_in_the_folder),
         TEST(what_cannot_go_on_is_seen_at_once),
