@@ -4,6 +4,7 @@
 #include "campaign/bench.h"
 #include "campaign/plan.h"
 #include "campaign/store.h"
+#include "daemon/instrument_devices.h"
 
 #include <math.h>
 
@@ -173,6 +174,8 @@ static void judge(struct instrument *in, struct acquire *a, struct acquire_readi
     } else if (r->flags & (STORE_UNLOCKED | STORE_UNSETTLED)) {
         r->again = true;
         a->set_up = (r->flags & STORE_UNSETTLED) != 0; // somebody changed it, or it restarted
+    } else if (r->monitor_failed) {
+        r->again = true;
     } else {
         r->accepted = true;
         if (r->range < top && signal_v > NEARLY_FULL * instrument_full_scale_v(in, r->range))
@@ -212,9 +215,11 @@ int acquire_attempt(struct instrument *in, struct acquire *a, const struct acqui
         rc = take_samples(in, a, wish, cancel, &r, err);
     if (rc >= 0)
         rc = instrument_condition(in, &condition, err);
+    if (rc >= 0)
+        rc = instrument_monitor_failed(in, &r.monitor_failed, err);
     if (rc < 0)
         return rc;
-    r.flags |= store_flags(condition);
+    r.flags |= store_flags(condition) | (r.monitor_failed ? STORE_DISCARDED : 0);
     judge(in, a, &r);
     *ret_reading = r;
     return 0;

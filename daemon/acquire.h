@@ -44,6 +44,7 @@ struct acquire_reading {
     double signal_v, signal_sd_v;   // mean, sample sd (0 for one sample)
     double monitor_v, monitor_sd_v; // NAN: no monitor
     unsigned flags;                 // of store.h
+    bool monitor_failed;            // a monitor of its own was beyond its range, or unsettled
     bool accepted;
     bool again; // not accepted, and another attempt may mend it (the range was changed in acquire)
 };

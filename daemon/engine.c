@@ -269,6 +269,11 @@ static int no_more_attempts(struct engine *e, const struct acquire_reading *r)
                                  "shutter and monitor, then: gonio resume",
                                  r->monitor_v, e->monitor_lit_v);
     }
+    if (r->monitor_failed)
+        return gon_fail(&e->why, GON_E_DEVICE,
+                        "monitor: beyond its range or unsettled in %d attempts; look at it and at "
+                        "its full_scale in the bench file, then: gonio resume",
+                        e->attempt);
     const char *what = r->flags & STORE_SATURATED  ? "saturated on its least sensitive range"
                        : r->flags & STORE_UNLOCKED ? "has no reference (chopper stopped?)"
                                                    : "gives no usable reading";
@@ -307,6 +312,9 @@ static int measure(struct engine *e, const struct travel_pose *at)
             begin_pace(e);
         }
         publish_reading(e, &r, at);
+        if (r.monitor_failed)
+            engine_say(e, ENGINE_LOG, "notice",
+                       "monitor: beyond its range or unsettled; the reading is discarded");
         if (r.accepted || !r.again)
             break;
         if (!e->ready) // the store paused the run: light and axes first

@@ -3,6 +3,7 @@
 
 #include "campaign/bench.h"
 #include "campaign/plan.h"
+#include "daemon/instrument_devices.h"
 
 #include <math.h>
 
@@ -134,6 +135,8 @@ static int warm_up(struct engine *e)
         if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
             rc = engine_check_laser(e);
     }
+    if (rc >= 0)
+        rc = instrument_fit_monitor(e->in, &e->why);
     return rc < 0 ? rc : wait_until_steady(e);
 }
 
