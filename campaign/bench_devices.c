@@ -4,6 +4,7 @@
 #include "base/options.h"
 #include "campaign/bench.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -68,6 +69,21 @@ const struct cfg_row bench_device_rows[] = {
 const struct cfg_row bench_place_rows[] = {
     TEXT(bench_place, "name", name, NULL, "The name of one of the devices."),
     TEXT(bench_place, "position", position, NULL, "Where it stands at the station."),
+    {.name = "transmission",
+     .type = CFG_REAL,
+     .offset = offsetof(struct bench_place, transmission),
+     .min = 0,
+     .max = 1e6,
+     .fallback = "0",
+     .help = "Of a filter at the beam: what it passes there, over what it passes where it stands "
+             "on the sample; 1 when the monitor stands behind it."},
+    {.name = "u_transmission",
+     .type = CFG_REAL,
+     .offset = offsetof(struct bench_place, u_transmission),
+     .min = 0,
+     .max = 1e6,
+     .fallback = "0",
+     .help = "Its standard uncertainty."},
     {0}};
 
 // --- finding -------------------------------------------------------------------------------------
@@ -86,6 +102,70 @@ int bench_dark_shutter(const struct bench_config *b)
         if (b->devices[i].darks)
             return i;
     return -1;
+}
+
+double bench_beam_passes(const struct bench_config *b, double *ret_u_rel)
+{
+    const struct bench_station *s = bench_find_station(b, "beam");
+    double passes = 1;
+    *ret_u_rel = 0;
+    for (int k = 0; s && k < s->places_count; k++)
+        if (s->places[k].transmission > 0) {
+            passes *= s->places[k].transmission;
+            *ret_u_rel = hypot(*ret_u_rel, s->places[k].u_transmission / s->places[k].transmission);
+        }
+    return passes;
+}
+
+// --- another day ---------------------------------------------------------------------------------
+
+static const char *place_of(const struct bench_station *s, const struct bench_device *d)
+{
+    for (int k = 0; s && k < s->places_count; k++)
+        if (!strcmp(s->places[k].name, d->name))
+            return s->places[k].position;
+    return d->position;
+}
+
+// The device that stands elsewhere now; NULL: none. New ones may stand anywhere.
+static const struct bench_device *moved(const struct bench_config *then,
+                                        const struct bench_config *now)
+{
+    for (int i = 0; i < then->devices_count; i++) {
+        const struct bench_device *d = &then->devices[i];
+        const int j = bench_device_index(now, d->name);
+        if (d->use == BENCH_INPUTS)
+            continue;
+        if (j < 0 || strcmp(d->position, now->devices[j].position) ||
+            strcmp(place_of(bench_find_station(then, "beam"), d),
+                   place_of(bench_find_station(now, "beam"), &now->devices[j])))
+            return d;
+    }
+    return NULL;
+}
+
+int bench_same_devices(const struct bench_config *then, const struct bench_config *now,
+                       struct gon_error *err)
+{
+    double u;
+    const struct bench_device *d = moved(then, now);
+    if (strcmp(then->monitor.driver, now->monitor.driver))
+        return gon_fail(err, GON_E_REFUSED,
+                        "the campaign was begun with %s%s as monitor, the bench has %s%s; go on "
+                        "with that bench",
+                        *then->monitor.driver ? "a " : "no instrument", then->monitor.driver,
+                        *now->monitor.driver ? "a " : "none", now->monitor.driver);
+    if (d)
+        return gon_fail(err, GON_E_REFUSED,
+                        "the campaign was begun with %s at '%s', which the bench has elsewhere or "
+                        "not at all; go on with that bench",
+                        d->name, d->position);
+    if (bench_beam_passes(then, &u) != bench_beam_passes(now, &u))
+        return gon_fail(err, GON_E_REFUSED,
+                        "the campaign was begun with a filter in the beam that passes %g, the "
+                        "bench's passes %g; go on with that bench",
+                        bench_beam_passes(then, &u), bench_beam_passes(now, &u));
+    return 0;
 }
 
 // --- checks across settings ----------------------------------------------------------------------
@@ -212,6 +292,16 @@ static int check_place(struct cfg_file *f, const struct bench_config *b, int sta
     }
     if (b->devices[device].use == BENCH_INPUTS)
         return cfg_complain(f, path, "has no positions: it is only read");
+    const struct bench_device *d = &b->devices[device];
+    const bool filters = !strcmp(s->name, "beam") && d->use == BENCH_FILTER &&
+                         strcmp(d->position, s->places[k].position);
+    if (filters && !(s->places[k].transmission > 0)) {
+        snprintf(path, sizeof path, "stations[%d].devices[%d].transmission", station, k);
+        return cfg_complain(f, path,
+                            "%s filters the beam: what it passes of it, over what it passes at "
+                            "\"%s\", is missing; 1 when it stands before the monitor",
+                            d->name, d->position);
+    }
     for (int j = 0; j < k; j++)
         if (!strcmp(s->places[j].name, s->places[k].name))
             return cfg_complain(f, path, "is placed twice at one station");

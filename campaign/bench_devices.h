@@ -4,6 +4,7 @@
 // printed from their tables. Thread: any.
 #pragma once
 #include "base/cfg.h"
+#include "base/err.h"
 
 #include <stdbool.h>
 
@@ -41,10 +42,14 @@ struct bench_device {
     bool darks;                       // a shutter that makes the darks while the laser stays on
 };
 
-// Where a device stands at a station.
+// Where a device stands at a station. A filter of the beam's station has to say what it does to
+// the signal there, against where it stands on the sample and over what it does to the monitor: 1
+// when it stands before the monitor, too.
 struct bench_place {
     char name[BENCH_DEVICE_NAME];
     char position[BENCH_DEVICE_NAME];
+    double transmission; // 0: not given
+    double u_transmission;
 };
 
 extern const struct cfg_row bench_monitor_rows[], bench_device_rows[], bench_place_rows[];
@@ -57,3 +62,9 @@ int bench_devices_check(struct cfg_file *f, const struct bench_config *b);
 // -1: none.
 int bench_device_index(const struct bench_config *b, const char *name);
 int bench_dark_shutter(const struct bench_config *b); // that makes the darks
+// What the filters of the beam's station pass of the beam; 1 without any.
+double bench_beam_passes(const struct bench_config *b, double *ret_u_rel);
+// Whether a campaign may go on with these devices: the same kind of monitor, selectors at the same
+// positions, the same filters in the beam. GON_E_REFUSED.
+int bench_same_devices(const struct bench_config *then, const struct bench_config *now,
+                       struct gon_error *err);

@@ -160,12 +160,16 @@ static int light_up(struct engine *e)
     return 0;
 }
 
+// With a shutter for it the laser stays as it is, warm.
 static int lights_out(struct engine *e)
 {
-    int rc = instrument_emission_off(e->in, &e->why);
+    int rc = engine_shut(e);
+    const bool stays = rc >= 0 && e->lit && engine_shutter_darkens(e);
+    if (rc >= 0 && !stays)
+        rc = instrument_emission_off(e->in, &e->why);
     if (rc < 0)
         return rc;
-    e->lit = false;
+    e->lit = stays;
     e->dark = true;
     e->light_ns = clk_now_ns(e->ports->clk);
     e->acquire.range = -1;
@@ -176,5 +180,9 @@ int engine_light_for(struct engine *e)
 {
     if (e->point->kind == PLAN_DARK)
         return e->dark ? 0 : lights_out(e);
-    return e->lit ? 0 : light_up(e);
+    if (!e->lit)
+        return light_up(e);
+    int rc = e->dark ? engine_open(e) : 0;
+    e->dark = e->dark && rc < 0;
+    return rc;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/engine_inside.h"
 
+#include "daemon/instrument_devices.h"
 #include "daemon/travel.h"
 
 #include <stdio.h>
@@ -36,6 +37,8 @@ void engine_make_safe(struct engine *e)
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
         engine_say(e, ENGINE_LOG, "err", "%s", err.text);
     travel_stop(e->in, NULL);
+    if (instrument_devices_safe(e->in, &err) < 0)
+        engine_say(e, ENGINE_LOG, "err", "%s", err.text);
 }
 
 static bool resume_asked(struct engine *e)

@@ -98,7 +98,7 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc, st
     return rc;
 }
 
-static bool is_part_there(const struct instrument *in, enum instrument_part part)
+bool instrument_is_there(const struct instrument *in, enum instrument_part part)
 {
     return part < INSTRUMENT_AXES   ? in->motor[part].axis != NULL
            : part == PART_LASER     ? in->safety != NULL
@@ -111,7 +111,7 @@ int instrument_need(struct instrument *in, enum instrument_part part, struct gon
 {
     assert(in->part[part].link != PART_ABSENT);
     in->talking = (int)part;
-    if (is_part_there(in, part))
+    if (instrument_is_there(in, part))
         return 0;
     return instrument_note(
         in, part, gon_fail(err, GON_E_GONE, "not there (%s)", in->part[part].address), err);
@@ -381,68 +381,9 @@ const struct bench_config *instrument_bench(const struct instrument *in)
     return in->bench;
 }
 
-static const struct link_stats *stats_of(const struct instrument *in, enum instrument_part part)
-{
-    if (!is_part_there(in, part))
-        return NULL;
-    if (part == PART_LASER)
-        return safety_stats(in->safety);
-    if (part == PART_DETECTOR)
-        return in->detector->ops->stats ? in->detector->ops->stats(in->detector) : NULL;
-    if (part == PART_MONITOR)
-        return in->monitor.detector->ops->stats ? in->monitor.detector->ops->stats(in->monitor.detector)
-                                                : NULL;
-    if (part >= PART_DEVICES)
-        return instrument_device_stats(in, part);
-    const struct axis *a = in->motor[part].axis;
-    return a->ops->stats ? a->ops->stats(a) : NULL;
-}
-
 const struct kinematics *instrument_kinematics(const struct instrument *in)
 {
     return &in->kinematics;
-}
-
-void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot)
-{
-    struct instrument_snapshot *s = ret_snapshot;
-    *s = (struct instrument_snapshot){
-        .t_ns = instrument_now_ns(in),
-        .laser = in->laser,
-        .emission = in->safety && safety_emission(in->safety),
-        .off_unconfirmed = in->safety && safety_pending(in->safety),
-        .range = in->range,
-        .full_scale_v = in->range >= 0 ? instrument_full_scale_v(in, in->range) : (double)NAN,
-        .signal_v = in->sample.signal_v,
-        .monitor_v = in->sample.monitor_v,
-        .time_constant_s = in->time_constant_s,
-    };
-    instrument_show_monitor(in, s);
-    instrument_show_devices(in, s);
-    memcpy(s->part, in->part, sizeof s->part);
-    for (enum instrument_part part = 0; part < PART_COUNT; part++) {
-        const struct link_stats *stats = stats_of(in, part);
-        if (stats)
-            s->part[part].stats = *stats;
-    }
-    for (int i = 0; i < INSTRUMENT_AXES; i++) {
-        const struct motor *m = &in->motor[i];
-        s->axis[i].unit = m->config ? m->config->unit_name : "";
-        s->axis[i].position = m->place.position;
-        s->axis[i].target = m->commanded;
-        s->axis[i].dial = m->place.dial;
-        s->axis[i].raw_steps = m->place.raw_steps;
-        s->axis[i].moving = m->place.moving;
-        s->axis[i].homed = m->place.homed;
-        s->axis[i].alarm = m->place.alarm;
-        s->axis[i].alarm_code = m->place.alarm_code;
-    }
-}
-
-bool instrument_is_dark(const struct instrument_snapshot *s)
-{
-    return s->part[PART_LASER].link == PART_OK && !s->emission && !s->off_unconfirmed &&
-           !s->laser.emission;
 }
 
 // --- an instrument that runs nothing ----------------------------------------------------------

@@ -259,17 +259,23 @@ static bool shares_link(const struct instrument *in, enum instrument_part part)
             !strcmp(in->part[part].address, in->part[in->talking].address));
 }
 
-// A relay that could not be kept is noticed by the next look at its device.
+// One that cannot be kept is lost, and not tried again in every slice.
+static void keep_relay(struct instrument *in, enum instrument_part part)
+{
+    struct gon_error err;
+    const int talking = in->talking;
+    in->talking = (int)part;
+    const int rc = inputs_keep(of(in, part)->inputs, &err);
+    if (rc < 0)
+        instrument_note(in, part, rc, &err);
+    in->talking = talking;
+}
+
 void instrument_keep_relays(struct instrument *in)
 {
     for (enum instrument_part part = PART_DEVICES; part < PART_COUNT; part++) {
-        const int talking = in->talking;
-        struct companion *c = of(in, part);
-        if (!c->inputs || in->part[part].link != PART_OK || shares_link(in, part))
-            continue;
-        in->talking = (int)part;
-        inputs_keep(c->inputs, NULL);
-        in->talking = talking;
+        if (of(in, part)->inputs && in->part[part].link == PART_OK && !shares_link(in, part))
+            keep_relay(in, part);
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What instrument.c (links, waiting, status), instrument_calls.c (what axes, laser and detector do),
-// instrument_monitor.c and instrument_devices.c share; nobody else includes it.
+// instrument_snapshot.c, instrument_monitor.c and instrument_devices.c share; nobody else includes it.
 #pragma once
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
@@ -76,6 +76,7 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc,
                     struct gon_error *err);
 // 0 when the part's object exists, so that it can be asked at all.
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err);
+bool instrument_is_there(const struct instrument *in, enum instrument_part part); // can be asked
 int instrument_write_set_up(struct instrument *in, struct gon_error *err); // of the detector
 int instrument_sample_detector(struct instrument *in, struct gon_error *err); // and no more
 int instrument_open_bus(struct instrument *in, int bus, struct gon_error *err); // or reopens it

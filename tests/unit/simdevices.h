@@ -35,6 +35,7 @@ struct simselector {
     bool is_shutter; // passes says what comes through at all; else what the detector gets of it
     int at, safe;
     bool stuck;
+    bool slips; // is one further each time it is looked at
     double travel_s;
     int looks, moves;
     int64_t gone_until_ns;
@@ -212,6 +213,8 @@ static inline int simselector_where(struct selector *z, int *ret_position, bool 
     s->looks++;
     if (rc < 0)
         return rc;
+    if (s->slips && s->at == 0)
+        simselector_turn(s, 1);
     *ret_position = s->at;
     if (ret_moving)
         *ret_moving = false;
