@@ -140,8 +140,8 @@ static void a_link_that_parts_share_is_told_once(void **state)
     assert_has(text, "gonio_link_up{link=\"tcp:d:1\"} 0");
     assert_has(text, "gonio_link_requests_total{link=\"" BUS "\"} 42");
     assert_has(text, "gonio_link_errors_total{link=\"" BUS "\",kind=\"silent\"} 4");
-    assert_int_equal(count(text, "\ngonio_link_requests_total{"), 3);
-    assert_int_equal(count(text, "\ngonio_link_errors_total{"), 3 * LINK_ERRORS);
+    assert_int_equal(count(text, "\ngonio_link_requests_total{"), 4);
+    assert_int_equal(count(text, "\ngonio_link_errors_total{"), 4 * LINK_ERRORS);
     free(text);
 }
 
