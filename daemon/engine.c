@@ -305,13 +305,14 @@ static double least_monitor_v(const struct engine *e)
 
 static int measure(struct engine *e, const struct travel_pose *at)
 {
-    struct acquire_wish wish = {readings_of(e), e->light_ns, least_monitor_v(e)};
+    struct acquire_wish wish = {.count = readings_of(e), .monitor_least_v = least_monitor_v(e)};
     const int most = instrument_ranges(e->in) + ATTEMPTS_MORE;
     struct acquire_reading r = {0};
     acquire_begin(&e->acquire);
     e->sought = 0;
     for (int k = 0; k < most; k++) {
         wish.since_ns = e->light_ns;
+        wish.source_ns = e->source_ns;
         int rc = acquire_attempt(e->in, &e->acquire, &wish, e->ports->cancel, &r, &e->why);
         if (rc >= 0)
             rc = engine_confirm_devices(e, &r);

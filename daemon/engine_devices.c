@@ -9,8 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-#define SHUT_SETTLE_NS CLK_MS(200) // of the monitor, before it is asked whether the light is gone
-#define STILL_LIT 0.5              // of the monitor after warm-up: above it the light is not gone
+#define SETTLE_NS CLK_MS(200) // of the monitor, before it is asked whether the light is there or gone
+#define STILL_LIT 0.5         // of the monitor after warm-up: above it the light is not gone
 
 static bool makes_darks(const struct engine *e, enum instrument_part part)
 {
@@ -51,7 +51,7 @@ bool engine_station_places(const struct engine *e)
 // What the detector has seen before says nothing any more.
 static void light_changed(struct engine *e)
 {
-    e->light_ns = clk_now_ns(e->ports->clk);
+    e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->acquire.range = -1;
 }
 
@@ -81,20 +81,38 @@ static int read_back(struct engine *e, enum instrument_part part)
     return rc;
 }
 
+// With a filter before the monitor "lit" is another value of it; the laser itself says that it is
+// on.
+static int learn_light(struct engine *e)
+{
+    struct detector_sample s;
+    int rc = engine_check_laser(e);
+    if (rc >= 0)
+        rc = engine_nap(e, SETTLE_NS);
+    if (rc >= 0)
+        rc = instrument_sample(e->in, &s, &e->why);
+    if (rc >= 0 && isfinite(s.monitor_v))
+        e->monitor_lit_v = s.monitor_v;
+    return rc;
+}
+
 int engine_place_devices(struct engine *e)
 {
+    bool moved = false;
     const bool all = e->devices_sweep != e->point->sweep;
     for (enum instrument_part part = PART_DEVICES; part < PART_COUNT; part++) {
         if (!instrument_is_selector(e->in, part))
             continue;
         int rc = all ? read_back(e, part) : 0;
-        if (rc >= 0 && !stands(e, part))
+        if (rc >= 0 && !stands(e, part)) {
             rc = select_it(e, part, wanted(e, part));
+            moved = true;
+        }
         if (rc < 0)
             return rc;
     }
     e->devices_sweep = e->point->sweep;
-    return 0;
+    return moved && e->lit && !e->dark ? learn_light(e) : 0;
 }
 
 // --- after a reading ---------------------------------------------------------------------------
@@ -153,7 +171,7 @@ static int light_is_gone(struct engine *e, enum instrument_part part)
 {
     struct detector_sample s;
     const double dark_v = isfinite(e->monitor_dark_v) ? e->monitor_dark_v : 0.0;
-    int rc = engine_nap(e, SHUT_SETTLE_NS);
+    int rc = engine_nap(e, SETTLE_NS);
     if (rc >= 0)
         rc = instrument_sample(e->in, &s, &e->why);
     if (rc < 0 || !(s.monitor_v - dark_v > STILL_LIT * (e->monitor_lit_v - dark_v)))

@@ -24,7 +24,7 @@ struct engine {
                  // makes the darks
     bool wanted; // the pause is the operator's
     int returns; // pauses that ended by themselves since the last accepted reading
-    int64_t light_ns, laser_look_ns;
+    int64_t light_ns, source_ns, laser_look_ns; // light_ns: also of arrivals
     struct acquire acquire;
     int devices_sweep; // in which all selectors were read back; -1: none
     unsigned sought;   // selectors that were set again at this point, a bit each

@@ -153,7 +153,7 @@ static int light_up(struct engine *e)
         return rc;
     e->lit = true;
     e->dark = false;
-    e->light_ns = clk_now_ns(e->ports->clk);
+    e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     e->acquire.range = -1;
     engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g V", e->monitor_lit_v);
@@ -171,7 +171,7 @@ static int lights_out(struct engine *e)
         return rc;
     e->lit = stays;
     e->dark = true;
-    e->light_ns = clk_now_ns(e->ports->clk);
+    e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->acquire.range = -1;
     return 0;
 }

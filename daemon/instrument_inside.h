@@ -32,6 +32,7 @@ struct monitor {
     struct profile *profile;
     struct detector *detector;
     int range; // set last; -1: none yet
+    double time_constant_s;
 };
 
 // A selector or inputs: one of both, NULL before it was opened first.

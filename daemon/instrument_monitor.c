@@ -48,8 +48,7 @@ static int set_up(struct instrument *in, struct gon_error *err)
                                          in->bench->wavelength_nm};
     const double most = in->bench->monitor.full_scale;
     const int range = m->range >= 0 ? m->range : most > 0 ? range_for(m, most) : top_range(m);
-    double time_constant_s;
-    int rc = m->detector->ops->setup(m->detector, &setup, &time_constant_s, err);
+    int rc = m->detector->ops->setup(m->detector, &setup, &m->time_constant_s, err);
     if (rc >= 0)
         rc = set_range(m, range, err);
     if (rc < 0)
@@ -68,6 +67,11 @@ int instrument_connect_monitor(struct instrument *in, struct gon_error *err)
     if (rc >= 0)
         rc = m->detector->ops->identify(m->detector, p->identity, sizeof p->identity, err);
     return rc < 0 ? rc : set_up(in, err);
+}
+
+double instrument_monitor_time_constant_s(const struct instrument *in)
+{
+    return in->monitor.time_constant_s;
 }
 
 int instrument_sample_monitor(struct instrument *in, double *ret_value, struct gon_error *err)

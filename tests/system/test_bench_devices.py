@@ -14,8 +14,8 @@ PLAN = """\
 campaign: {
   name = "devices";
   theta_i_deg = [ 20.0, 40.0 ];
-  theta_r: { from_deg = -70.0; to_deg = 70.0; step_deg = 4.0; };
-  dense: { half_width_deg = 2.0; step_deg = 1.0; };
+  theta_r: { from_deg = -70.0; to_deg = 70.0; step_deg = 8.0; };
+  dense: { half_width_deg = 2.0; step_deg = 2.0; };
   readings: { count = 2; };
 };
 """

@@ -136,6 +136,28 @@ static void filtered_beam(struct bench_config *b)
     p->transmission = 0.1; // simdevices.h
 }
 
+static void before_the_monitor(struct bench_config *b)
+{
+    b->devices[0] = b->devices[1]; // no shutter
+    b->devices_count = 1;
+    filtered_beam(b);
+    b->stations[0].places[0].transmission = 1;
+}
+
+// The monitor falls to a tenth at the beam: that is not the light lost.
+static void a_filter_before_the_monitor_takes_nothing_from_the_value(void **state)
+{
+    (void)state;
+    struct run *r = begin_with(before_the_monitor);
+    r->devices.wheel.is_shutter = true; // it cuts the source's light
+    r->b.world.lets_in = 1;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_values(r);
+    assert_int_equal(r->pauses_count, 0);
+    end(r);
+}
+
 // The detector sees the beam only with the filter in.
 static void watch_beam(struct run *r)
 {
@@ -412,6 +434,7 @@ int main(void)
         cmocka_unit_test(with_darks_the_shutter_makes_them_and_the_laser_stays_on),
         cmocka_unit_test(a_dark_between_the_sweeps_costs_no_warm_up),
         cmocka_unit_test(a_station_has_its_filter_before_the_axes_come_and_until_they_left),
+        cmocka_unit_test(a_filter_before_the_monitor_takes_nothing_from_the_value),
         cmocka_unit_test(after_a_pause_at_the_beam_the_light_waits_until_they_left),
         cmocka_unit_test(a_wheel_turned_by_hand_costs_an_attempt_and_no_value),
         cmocka_unit_test(one_that_strays_again_pauses_the_run),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: daemon campaign drivers fit sim model base
 // A detector of its own as monitor: read with each sample, its range, and what is wrong with it.
+#include "daemon/acquire.h"
 #include "daemon/instrument_devices.h"
 
 #include <setjmp.h>
@@ -118,6 +119,26 @@ static void it_is_read_directly_after_the_detector(void **state)
     end(r);
 }
 
+// 50 ms, 12 dB per octave: 11.8 time constants to 1e-4; the detector's 1 ms need 12 ms.
+static void a_slow_one_settles_after_a_change_of_the_source_only(void **state)
+{
+    (void)state;
+    struct run *r = begin_monitored(0);
+    struct acquire a = {.range = -1};
+    struct acquire_reading reading;
+    r->bench.detector.time_constant_s = 0.001;
+    assert_int_equal(instrument_set_up(r->in, NULL), 0);
+    const int64_t before_ns = r->b.clk.t_ns;
+    struct acquire_wish wish = {2, before_ns, before_ns, (double)NAN};
+    assert_int_equal(acquire_attempt(r->in, &a, &wish, NULL, &reading, NULL), 0);
+    assert_true(r->b.clk.t_ns - before_ns >= CLK_S(0.58));
+    const int64_t then_ns = r->b.clk.t_ns;
+    wish.since_ns = then_ns; // an axis came
+    assert_int_equal(acquire_attempt(r->in, &a, &wish, NULL, &reading, NULL), 0);
+    assert_true(r->b.clk.t_ns - then_ns < CLK_S(0.1));
+    end(r);
+}
+
 static void brighten(struct run *r)
 {
     if (is_then(r))
@@ -216,6 +237,7 @@ int main(void)
         cmocka_unit_test(its_range_is_kept_when_the_laser_comes_on_again),
         cmocka_unit_test(with_a_full_scale_the_range_stands_from_the_start),
         cmocka_unit_test(it_is_read_directly_after_the_detector),
+        cmocka_unit_test(a_slow_one_settles_after_a_change_of_the_source_only),
         cmocka_unit_test(a_saturated_monitor_discards_the_attempt_and_goes_one_range_up),
         cmocka_unit_test(one_that_lost_its_settings_is_set_up_again),
         cmocka_unit_test(one_beyond_every_range_pauses_the_run),
