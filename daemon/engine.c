@@ -233,8 +233,6 @@ static int prepare(struct engine *e)
     if (rc >= 0)
         rc = travel_home(e->in, e->ports->cancel, &e->why);
     e->devices_sweep = -1;
-    if (rc >= 0)
-        rc = engine_place_devices(e);
     e->ready = rc >= 0;
     e->pace_ns = 0;
     instrument_permit(e->in, e->ready);

@@ -82,7 +82,7 @@ static int read_back(struct engine *e, enum instrument_part part)
 }
 
 // With a filter before the monitor "lit" is another value of it; the laser itself says that it is
-// on.
+// on. Never of a shutter, which may be stuck.
 static int learn_light(struct engine *e)
 {
     struct detector_sample s;
@@ -98,7 +98,7 @@ static int learn_light(struct engine *e)
 
 int engine_place_devices(struct engine *e)
 {
-    bool moved = false;
+    bool filtered = false;
     const bool all = e->devices_sweep != e->point->sweep;
     for (enum instrument_part part = PART_DEVICES; part < PART_COUNT; part++) {
         if (!instrument_is_selector(e->in, part))
@@ -106,13 +106,13 @@ int engine_place_devices(struct engine *e)
         int rc = all ? read_back(e, part) : 0;
         if (rc >= 0 && !stands(e, part)) {
             rc = select_it(e, part, wanted(e, part));
-            moved = true;
+            filtered = filtered || instrument_device(e->in, part)->use != BENCH_SHUTTER;
         }
         if (rc < 0)
             return rc;
     }
     e->devices_sweep = e->point->sweep;
-    return moved && e->lit && !e->dark ? learn_light(e) : 0;
+    return filtered && e->lit && !e->dark ? learn_light(e) : 0;
 }
 
 // --- after a reading ---------------------------------------------------------------------------
@@ -188,12 +188,6 @@ int engine_shut(struct engine *e)
     const enum instrument_part part = dark_shutter(e);
     int rc = part < PART_COUNT ? select_it(e, part, instrument_safe_position(e->in, part)) : 0;
     return rc >= 0 && part < PART_COUNT && e->lit ? light_is_gone(e, part) : rc;
-}
-
-int engine_open(struct engine *e)
-{
-    const enum instrument_part part = dark_shutter(e);
-    return part < PART_COUNT ? select_it(e, part, wanted(e, part)) : 0;
 }
 
 bool engine_shutter_darkens(const struct engine *e)

@@ -71,10 +71,9 @@ bool engine_station_places(const struct engine *e);
 // stored, that one is set again, the first time at a point.
 int engine_confirm_devices(struct engine *e, struct acquire_reading *r);
 int engine_seek_device(struct engine *e);
-// The shutter that makes the darks, if there is one: closed, and no light behind it; open.
+// The shutter that makes the darks, if there is one: closed, and no light behind it.
 bool engine_shutter_darkens(const struct engine *e);
 int engine_shut(struct engine *e);
-int engine_open(struct engine *e);
 
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.

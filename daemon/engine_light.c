@@ -152,7 +152,6 @@ static int light_up(struct engine *e)
     if (rc < 0)
         return rc;
     e->lit = true;
-    e->dark = false;
     e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     e->acquire.range = -1;
@@ -180,9 +179,6 @@ int engine_light_for(struct engine *e)
 {
     if (e->point->kind == PLAN_DARK)
         return e->dark ? 0 : lights_out(e);
-    if (!e->lit)
-        return light_up(e);
-    int rc = e->dark ? engine_open(e) : 0;
-    e->dark = e->dark && rc < 0;
-    return rc;
+    e->dark = false; // a shutter that made the dark opens when the devices are placed
+    return e->lit ? 0 : light_up(e);
 }

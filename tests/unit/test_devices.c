@@ -158,6 +158,58 @@ static void a_filter_before_the_monitor_takes_nothing_from_the_value(void **stat
     end(r);
 }
 
+// Warm before the filter came in.
+static void a_filter_before_the_monitor_is_no_light_lost(void **state)
+{
+    (void)state;
+    struct run *r = begin_with(before_the_monitor);
+    r->devices.wheel.is_shutter = true;
+    r->b.world.lets_in = 1;
+    r->plan.count = 0;
+    r->plan.sweeps = 1;
+    add_point(r, 0, 1, PLAN_DARK, 0, 0);
+    add_point(r, 1, 1, PLAN_SAMPLE, 10, 20);
+    add_point(r, 2, 1, PLAN_BEAM, 0, 180);
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 0);
+    end(r);
+}
+
+// Says that it is open, and is not: the monitor knows.
+static void lie(struct run *r)
+{
+    if (last_is(r, 1, 2)) // a dark
+        r->devices.shutter.passes[0] = 0.2;
+}
+
+static void mend_shutter(struct run *r)
+{
+    r->devices.shutter.passes[0] = 1;
+    simselector_turn(&r->devices.shutter, r->devices.shutter.at);
+}
+
+static void a_shutter_that_only_says_open_is_light_lost(void **state)
+{
+    (void)state;
+    struct run *r = begin_with(darks);
+    r->plan.count = 0;
+    r->plan.sweeps = 2;
+    add_point(r, 0, 1, PLAN_DARK, 0, 0);
+    add_point(r, 0, 2, PLAN_BEAM, 0, 180);
+    add_point(r, 1, 1, PLAN_SAMPLE, 10, 20);
+    add_point(r, 1, 2, PLAN_DARK, 0, 0);
+    add_point(r, 2, 1, PLAN_SAMPLE, 10, 40);
+    r->on_row = lie;
+    r->on_pause = mend_shutter;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_values(r);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "the monitor fell"));
+    end(r);
+}
+
 // The detector sees the beam only with the filter in.
 static void watch_beam(struct run *r)
 {
@@ -210,6 +262,7 @@ static void a_wheel_turned_by_hand_costs_an_attempt_and_no_value(void **state)
     (void)state;
     struct run *r = begin_with(NULL);
     r->on_row = turn_wheel;
+    r->devices.wheel.passes[1] = 0.7; // so that no change of range makes it settle
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
     assert_values(r);
@@ -435,6 +488,8 @@ int main(void)
         cmocka_unit_test(a_dark_between_the_sweeps_costs_no_warm_up),
         cmocka_unit_test(a_station_has_its_filter_before_the_axes_come_and_until_they_left),
         cmocka_unit_test(a_filter_before_the_monitor_takes_nothing_from_the_value),
+        cmocka_unit_test(a_filter_before_the_monitor_is_no_light_lost),
+        cmocka_unit_test(a_shutter_that_only_says_open_is_light_lost),
         cmocka_unit_test(after_a_pause_at_the_beam_the_light_waits_until_they_left),
         cmocka_unit_test(a_wheel_turned_by_hand_costs_an_attempt_and_no_value),
         cmocka_unit_test(one_that_strays_again_pauses_the_run),
