@@ -186,8 +186,9 @@ static const struct cfg_row row_rows[] = {
     {0}};
 
 static const struct cfg_row daemon_rows[] = {
-    TEXT(bench_config, "directory", directory, "",
-         "Where campaign files go; goniod(8), FILES, says what goes before it and where otherwise."),
+    TEXT(
+        bench_config, "directory", directory, "",
+        "Where campaign files go; goniod(8), FILES, says what goes before it and where otherwise."),
     {0}};
 
 #define MANY(n, member, most, element, table, def, text)                                           \

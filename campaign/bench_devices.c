@@ -207,8 +207,8 @@ static int check_name(struct cfg_file *f, const struct bench_config *b, int i)
     int mistakes = 0;
     if (!*name || name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_-")] ||
         !strcmp(name, "laser") || !strcmp(name, "detector") || !strcmp(name, "monitor"))
-        mistakes += complain(f, i, "name",
-                             "allowed a-z, 0-9, _ and -, and not laser, detector or monitor");
+        mistakes +=
+            complain(f, i, "name", "allowed a-z, 0-9, _ and -, and not laser, detector or monitor");
     if (bench_find_axis(b, name))
         mistakes += complain(f, i, "name", "is the name of an axis too");
     if (bench_device_index(b, name) < i)
@@ -265,7 +265,10 @@ static int check_inputs(struct cfg_file *f, const struct bench_config *b, int i)
     const struct bench_device *d = &b->devices[i];
     int mistakes = 0;
     if (*d->position || *d->safe || d->darks)
-        mistakes += complain(f, i, *d->position ? "position" : *d->safe ? "safe" : "darks",
+        mistakes += complain(f, i,
+                             *d->position ? "position"
+                             : *d->safe   ? "safe"
+                                          : "darks",
                              "inputs are only read");
     if (*d->bus && *d->link)
         mistakes += complain(f, i, "link", "a link or a bus, not both");
@@ -313,8 +316,8 @@ int bench_devices_check(struct cfg_file *f, const struct bench_config *b)
     int mistakes = check_monitor(f, b);
     for (int i = 0; i < b->devices_count; i++) {
         mistakes += check_name(f, b, i);
-        mistakes += b->devices[i].use == BENCH_INPUTS ? check_inputs(f, b, i)
-                                                      : check_selector(f, b, i);
+        mistakes +=
+            b->devices[i].use == BENCH_INPUTS ? check_inputs(f, b, i) : check_selector(f, b, i);
     }
     for (int i = 0; i < b->stations_count; i++)
         for (int k = 0; k < b->stations[i].places_count; k++)

@@ -26,10 +26,9 @@
 // Fluctuations of the laser that the monitor divides out count in both: u_A is rather too large
 // than too small.
 // u_B, common to all points of a channel (a pol_in and pol_out) as one factor: beam, 2u(r)/r,
-// 2u(d)/d, linearity, u(T)/T, the filter's. Elements that pass up to a part e of crossed light add 0..e f_x to f;
-// u_B has e f_x/sqrt(3) of it (rectangular, not corrected), f_x being the reading of the crossed
-// state in the same direction where there is one, else f itself.
-// Thread: any.
+// 2u(d)/d, linearity, u(T)/T, the filter's. Elements that pass up to a part e of crossed light add
+// 0..e f_x to f; u_B has e f_x/sqrt(3) of it (rectangular, not corrected), f_x being the reading of
+// the crossed state in the same direction where there is one, else f itself. Thread: any.
 #pragma once
 #include "base/err.h"
 #include "campaign/bench.h"

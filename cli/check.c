@@ -124,7 +124,7 @@ int check_line_of(const char *text, const char *word)
 }
 
 int check_link(const char *path, const char *text, const char *link, enum link_use use,
-                      struct cfg_sink sink)
+               struct cfg_sink sink)
 {
     struct link l;
     struct gon_error err;
@@ -152,7 +152,7 @@ static int check_role(const struct bench_config *bench, const char *name, enum p
 }
 
 int check_profile(const char *path, const char *text, const struct bench_config *bench,
-                         const char *name, enum profile_role role, struct cfg_sink sink)
+                  const char *name, enum profile_role role, struct cfg_sink sink)
 {
     struct gon_error err;
     char line[800];

@@ -36,8 +36,8 @@ static struct link taken_apart(const char *text, enum link_use use)
     return l;
 }
 
-void examine_tell_open(const struct examine *e, const char *who, const char *text, enum link_use use,
-                      const struct gon_error *err)
+void examine_tell_open(const struct examine *e, const char *who, const char *text,
+                       enum link_use use, const struct gon_error *err)
 {
     struct finding f;
     char ports[600];
@@ -154,7 +154,7 @@ static bool tell_instead(const struct examine *e, const char *who, const char *e
 }
 
 void examine_tell_talk(const struct examine *e, const char *part, const char *port,
-                      const char *driver, const struct gon_error *err)
+                       const char *driver, const struct gon_error *err)
 {
     struct finding f;
     const struct link l = taken_apart(port, LINK_TEXT);

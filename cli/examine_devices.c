@@ -162,8 +162,7 @@ static void examine_monitor(const struct examine *e)
 static void examine_device(const struct examine *e, const struct bench_device *d)
 {
     const struct bench_bus *b = bus_of(e, d);
-    struct visit v = {
-        .e = e, .name = d->name, .driver = d->driver, .link = b ? b->link : d->link};
+    struct visit v = {.e = e, .name = d->name, .driver = d->driver, .link = b ? b->link : d->link};
     if (e->held(e->ctx, v.name, v.link))
         return;
     if (d->use == BENCH_INPUTS)

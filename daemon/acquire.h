@@ -33,9 +33,9 @@ struct acquire {
 };
 
 struct acquire_wish {
-    int count;              // samples, 1..1000
-    int64_t since_ns;       // when the light last changed: arrival, laser on or off
-    int64_t source_ns;      // when that of the source did: what a monitor of its own has to settle from
+    int count;         // samples, 1..1000
+    int64_t since_ns;  // when the light last changed: arrival, laser on or off
+    int64_t source_ns; // when that of the source did: what a monitor of its own has to settle from
     double monitor_least_v; // below it the light was lost; NAN: not checked
 };
 

@@ -240,8 +240,8 @@ static int prepare(struct engine *e)
     return rc;
 }
 
-// A dark needs no place: it is measured where the axes are, unless the plan says where. A filter that
-// a station asks for is in before the axes go there, and out after they have left.
+// A dark needs no place: it is measured where the axes are, unless the plan says where. A filter
+// that a station asks for is in before the axes go there, and out after they have left.
 static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;

@@ -9,8 +9,9 @@
 #include <math.h>
 #include <string.h>
 
-#define SETTLE_NS CLK_MS(200) // of the monitor, before it is asked whether the light is there or gone
-#define STILL_LIT 0.5         // of the monitor after warm-up: above it the light is not gone
+#define SETTLE_NS                                                                                  \
+    CLK_MS(200)       // of the monitor, before it is asked whether the light is there or gone
+#define STILL_LIT 0.5 // of the monitor after warm-up: above it the light is not gone
 
 static bool makes_darks(const struct engine *e, enum instrument_part part)
 {

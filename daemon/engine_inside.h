@@ -26,8 +26,8 @@ struct engine {
     int returns; // pauses that ended by themselves since the last accepted reading
     int64_t light_ns, source_ns, laser_look_ns; // light_ns: also of arrivals
     struct acquire acquire;
-    int devices_sweep; // in which all selectors were read back; -1: none
-    unsigned sought;   // selectors that were set again at this point, a bit each
+    int devices_sweep;            // in which all selectors were read back; -1: none
+    unsigned sought;              // selectors that were set again at this point, a bit each
     enum instrument_part strayed; // found elsewhere after the last reading; PART_COUNT: none
 
     double omega_sr, monitor_dark_v, monitor_lit_v;
@@ -47,8 +47,8 @@ void engine_say(struct engine *e, enum engine_event_kind kind, const char *level
 void engine_enter(struct engine *e, enum run_state state, const char *text);
 
 // --- engine_pause.c ---
-int engine_canceled(struct engine *e);        // GON_E_CANCELED
-int engine_nap(struct engine *e, int64_t ns); // GON_E_CANCELED
+int engine_canceled(struct engine *e);                 // GON_E_CANCELED
+int engine_nap(struct engine *e, int64_t ns);          // GON_E_CANCELED
 const char *engine_light_text(const struct engine *e); // what may be said of the laser
 void engine_make_safe(struct engine *e);               // emission off, axes stopped
 // RUN_PAUSED; where the laser is not known to be off the text begins with that.

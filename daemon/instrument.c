@@ -100,11 +100,11 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc, st
 
 bool instrument_is_there(const struct instrument *in, enum instrument_part part)
 {
-    return part < INSTRUMENT_AXES   ? in->motor[part].axis != NULL
-           : part == PART_LASER     ? in->safety != NULL
-           : part == PART_DETECTOR  ? in->detector != NULL
-           : part == PART_MONITOR   ? in->monitor.detector != NULL
-                                    : instrument_device_there(in, part);
+    return part < INSTRUMENT_AXES  ? in->motor[part].axis != NULL
+           : part == PART_LASER    ? in->safety != NULL
+           : part == PART_DETECTOR ? in->detector != NULL
+           : part == PART_MONITOR  ? in->monitor.detector != NULL
+                                   : instrument_device_there(in, part);
 }
 
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err)

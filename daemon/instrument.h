@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The bench: axes in user units (degrees, millimetres), laser, detector, monitor and further devices
-// (daemon/instrument_devices.h), opened from a bench configuration and kept open. Each part's link state, last values and errors are remembered for
-// `gonio status`. Thread: instrument; others see copies of struct instrument_snapshot.
+// The bench: axes in user units (degrees, millimetres), laser, detector, monitor and further
+// devices (daemon/instrument_devices.h), opened from a bench configuration and kept open. Each
+// part's link state, last values and errors are remembered for `gonio status`. Thread: instrument;
+// others see copies of struct instrument_snapshot.
 //
 // A part that is not there when the bench is opened, or that goes away, is "lost": calls to it fail
 // with GON_E_GONE or GON_E_LINK and its name in front ("axis theta_r: ..."), and instrument_connect
@@ -42,14 +43,14 @@ enum instrument_part {
 enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 
 struct part_state {
-    const char *name;    // the axis's, the device's, "laser", "detector", "monitor"; "": absent
-    enum part_link link; // PART_ABSENT: the bench has none
-    const char *driver;  // as the bench file names it; "": absent
-    const char *address; // of its link; "" when made from ready objects
-    char identity[96];   // what it said it is
-    char problem[240];   // why it is lost; "" when it is not
-    uint64_t errors;     // failed calls since the start
-    uint64_t returns;    // times it came back
+    const char *name;     // the axis's, the device's, "laser", "detector", "monitor"; "": absent
+    enum part_link link;  // PART_ABSENT: the bench has none
+    const char *driver;   // as the bench file names it; "": absent
+    const char *address;  // of its link; "" when made from ready objects
+    char identity[96];    // what it said it is
+    char problem[240];    // why it is lost; "" when it is not
+    uint64_t errors;      // failed calls since the start
+    uint64_t returns;     // times it came back
     char last_error[240]; // "" when there was none since the start
     int64_t last_error_ns;
     struct link_stats stats; // of its link, which others may share; zero without one
@@ -92,7 +93,7 @@ struct instrument_snapshot {
     int monitor_range;          // of a monitor of its own; -1: not known
     double monitor_full_scale;  // in its unit; NAN: not known
     struct device_state device[BENCH_DEVICES];
-    double time_constant_s;     // as the device has it
+    double time_constant_s; // as the device has it
 };
 
 // Objects that exist already, for tests and simulations; taken over, each may be NULL but not laser
@@ -138,7 +139,8 @@ int instrument_tend(struct instrument *in);
 int instrument_reconnect(struct instrument *in);
 
 // A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off,
-// an axis stopped, a detector set up as configured; a selector stays where it is. 0 when it is there.
+// an axis stopped, a detector set up as configured; a selector stays where it is. 0 when it is
+// there.
 enum instrument_part instrument_lost(const struct instrument *in);
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_has(const struct instrument *in, enum instrument_part part);

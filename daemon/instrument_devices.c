@@ -69,20 +69,20 @@ static int check_positions(const struct instrument *in, const struct companion *
             if (!strcmp(s->places[k].name, c->config->name))
                 rc = check_position(c, s->places[k].position, err);
     }
-    if (rc >= 0 && c->config->darks && !*c->config->safe &&
-        c->selector->ops->safe(c->selector) < 0)
-        return gon_fail(err, GON_E_INPUT, "makes the darks: its position for that is missing, give "
-                                          "it as safe");
+    if (rc >= 0 && c->config->darks && !*c->config->safe && c->selector->ops->safe(c->selector) < 0)
+        return gon_fail(err, GON_E_INPUT,
+                        "makes the darks: its position for that is missing, give "
+                        "it as safe");
     return rc;
 }
 
 static int connect_selector(struct instrument *in, struct companion *c, struct part_state *p,
                             struct gon_error *err)
 {
-    int rc = c->selector ? c->selector->ops->reopen(c->selector, err)
-                         : device_open_selector(p->driver, in->bench->folder, &c->profile,
-                                                p->address, &in->breathing.clk, NULL,
-                                                &c->selector, err);
+    int rc = c->selector
+                 ? c->selector->ops->reopen(c->selector, err)
+                 : device_open_selector(p->driver, in->bench->folder, &c->profile, p->address,
+                                        &in->breathing.clk, NULL, &c->selector, err);
     c->position = SELECTOR_ELSEWHERE;
     if (rc >= 0)
         rc = check_positions(in, c, err);

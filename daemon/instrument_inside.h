@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What instrument.c (links, waiting, status), instrument_calls.c (what axes, laser and detector do),
-// instrument_snapshot.c, instrument_monitor.c and instrument_devices.c share; nobody else includes it.
+// What instrument.c (links, waiting, status), instrument_calls.c (what axes, laser and detector
+// do), instrument_snapshot.c, instrument_monitor.c and instrument_devices.c share; nobody else
+// includes it.
 #pragma once
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
@@ -68,7 +69,8 @@ struct instrument {
     struct detector_sample sample;
     struct monitor monitor;
     struct companion companion[BENCH_DEVICES];
-    int talking; // the part that is being talked to, whose link nobody else may use; PART_COUNT: none
+    int talking; // the part that is being talked to, whose link nobody else may use; PART_COUNT:
+                 // none
 };
 
 // Keeps the part's book: what came of a call to it. Puts its name before the error's text. Returns
@@ -78,9 +80,9 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc,
 // 0 when the part's object exists, so that it can be asked at all.
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_is_there(const struct instrument *in, enum instrument_part part); // can be asked
-int instrument_write_set_up(struct instrument *in, struct gon_error *err); // of the detector
-int instrument_sample_detector(struct instrument *in, struct gon_error *err); // and no more
-int instrument_open_bus(struct instrument *in, int bus, struct gon_error *err); // or reopens it
+int instrument_write_set_up(struct instrument *in, struct gon_error *err);        // of the detector
+int instrument_sample_detector(struct instrument *in, struct gon_error *err);     // and no more
+int instrument_open_bus(struct instrument *in, int bus, struct gon_error *err);   // or reopens it
 
 // --- instrument_monitor.c ---
 int instrument_connect_monitor(struct instrument *in, struct gon_error *err);

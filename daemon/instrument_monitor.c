@@ -60,10 +60,10 @@ int instrument_connect_monitor(struct instrument *in, struct gon_error *err)
 {
     struct monitor *m = &in->monitor;
     struct part_state *p = &in->part[PART_MONITOR];
-    int rc = m->detector ? m->detector->ops->reopen(m->detector, err)
-                         : device_open_detector(p->driver, in->bench->folder, &m->profile,
-                                                p->address, &in->breathing.clk, NULL, &m->detector,
-                                                err);
+    int rc = m->detector
+                 ? m->detector->ops->reopen(m->detector, err)
+                 : device_open_detector(p->driver, in->bench->folder, &m->profile, p->address,
+                                        &in->breathing.clk, NULL, &m->detector, err);
     if (rc >= 0)
         rc = m->detector->ops->identify(m->detector, p->identity, sizeof p->identity, err);
     return rc < 0 ? rc : set_up(in, err);

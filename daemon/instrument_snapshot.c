@@ -13,8 +13,9 @@ static const struct link_stats *stats_of(const struct instrument *in, enum instr
     if (part == PART_DETECTOR)
         return in->detector->ops->stats ? in->detector->ops->stats(in->detector) : NULL;
     if (part == PART_MONITOR)
-        return in->monitor.detector->ops->stats ? in->monitor.detector->ops->stats(in->monitor.detector)
-                                                : NULL;
+        return in->monitor.detector->ops->stats
+                   ? in->monitor.detector->ops->stats(in->monitor.detector)
+                   : NULL;
     if (part >= PART_DEVICES)
         return instrument_device_stats(in, part);
     const struct axis *a = in->motor[part].axis;

@@ -45,10 +45,10 @@ static json_t *one(const struct instrument_snapshot *s, int part)
     char serial[64];
     identity_serial(p->identity, serial, sizeof serial);
     json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name,
-                          "kind", view_kind(s, part), "driver", p->driver, "link", p->address, "state",
-                          p->link == PART_OK ? "ok" : "lost", "why", p->problem, "identity",
-                          p->identity, "serial", serial, "errors", (json_int_t)p->errors, "returns",
-                          (json_int_t)p->returns);
+                          "kind", view_kind(s, part), "driver", p->driver, "link", p->address,
+                          "state", p->link == PART_OK ? "ok" : "lost", "why", p->problem,
+                          "identity", p->identity, "serial", serial, "errors",
+                          (json_int_t)p->errors, "returns", (json_int_t)p->returns);
     add_last_error(o, p, s->t_ns);
     json_object_set_new(o, "traffic", inventory_traffic(&p->stats));
     json_object_set_new(o, view_kind(s, part), view_part(s, part));

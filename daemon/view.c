@@ -14,12 +14,11 @@ json_t *view_number(double value)
 
 json_t *view_run(const struct run *run, bool with_fit)
 {
-    json_t *o =
-        json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id, "name",
-                  run->name, "sample", run->sample, "file", run->path, "state",
-                  run_state_name(run->state), "text", run->text, "sweep", run->sweep, "sweeps",
-                  run->sweeps, "done", run->done, "total", run->total, "emission",
-                  run->light == SAFETY_LIGHT_MAYBE);
+    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id,
+                          "name", run->name, "sample", run->sample, "file", run->path, "state",
+                          run_state_name(run->state), "text", run->text, "sweep", run->sweep,
+                          "sweeps", run->sweeps, "done", run->done, "total", run->total, "emission",
+                          run->light == SAFETY_LIGHT_MAYBE);
     json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
     json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
     json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));
@@ -136,10 +135,9 @@ json_t *view_devices(const struct instrument_snapshot *s)
         if (p->link == PART_ABSENT)
             continue;
         json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name, "kind",
-                              view_kind(s, i), "link",
-                              p->link == PART_OK ? "ok" : "lost", "address", p->address, "identity",
-                              p->identity, "problem", p->problem, "errors", (json_int_t)p->errors,
-                              "returns", (json_int_t)p->returns);
+                              view_kind(s, i), "link", p->link == PART_OK ? "ok" : "lost",
+                              "address", p->address, "identity", p->identity, "problem", p->problem,
+                              "errors", (json_int_t)p->errors, "returns", (json_int_t)p->returns);
         json_object_update_new(o, view_part(s, i));
         json_array_append_new(all, o);
     }

@@ -144,7 +144,8 @@ double world_aux_v(struct world *w, int input)
 {
     double v = w->spec.monitor_noise_v * noise_normal(&w->monitor_noise);
     if (input == 1)
-        v += w->spec.monitor_dark_v + w->spec.monitor_v_per_w * w->lets_out * sim_laser_power_w(&w->laser);
+        v += w->spec.monitor_dark_v +
+             w->spec.monitor_v_per_w * w->lets_out * sim_laser_power_w(&w->laser);
     v = fmin(fmax(v, -10.5), 10.5);
     return rint(v * 3000) / 3000;
 }

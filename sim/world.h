@@ -60,7 +60,7 @@ struct world {
     } view;
     double lets_out; // part of its light that leaves the source: a shutter; 1
     double lets_in;  // part of the light that reaches the detector, not the monitor: filters; 1
-    bool saturate; // fault injection: the input sees far too much
+    bool saturate;   // fault injection: the input sees far too much
 };
 
 // "theta_i", "theta_r", "sample", "polariser", "analyser"

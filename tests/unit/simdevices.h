@@ -18,9 +18,9 @@ struct simmonitor {
     bool clipped;
     double wavelength_nm;
     int samples, setups, range_changes;
-    int nonsense;    // answers that are not numbers, to come
-    double times;    // the light is so much stronger than it should be; 1
-    int restarts;    // conditions "unsettled", to come
+    int nonsense; // answers that are not numbers, to come
+    double times; // the light is so much stronger than it should be; 1
+    int restarts; // conditions "unsettled", to come
     int64_t gone_until_ns;
     double at_signal_v; // of the world's lock-in when it was read last
 };
@@ -231,8 +231,7 @@ static inline int simselector_go(struct selector *z, int position, struct gon_er
     s->moves++;
     clk_sleep(&s->bench->clk.clk, CLK_S(s->travel_s), NULL);
     if (s->stuck)
-        return gon_fail(err, GON_E_DEVICE, "does not go to '%s'; is it stuck?",
-                        s->names[position]);
+        return gon_fail(err, GON_E_DEVICE, "does not go to '%s'; is it stuck?", s->names[position]);
     simselector_turn(s, position);
     return 0;
 }

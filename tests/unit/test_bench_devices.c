@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: campaign fit model base
-// Monitor, selectors and inputs in a bench file: what is right, what is a mistake and on which line.
+// Monitor, selectors and inputs in a bench file: what is right, what is a mistake and on which
+// line.
 #include "campaign_fixture.h"
 
 #include <math.h>
@@ -18,17 +19,21 @@
 static const char *bench(const char *aux, const char *more, const char *places)
 {
     static char text[4000];
-    snprintf(text, sizeof text,
-             "bench: { name = \"b\"; wavelength_nm = 1060.0; aperture_radius_mm = 8.0;\n"
-             "  u_aperture_radius_mm = 0.0; distance_mm = 500.0; u_distance_mm = 0.0; };\n"
-             "buses: ( { name = \"axes\"; link = \"modbus-tcp:axes:502\"; } );\n"
-             "axes: (\n" AXIS("theta_i", "1") "," AXIS("theta_r", "2") " );\n"
-             "laser: { driver = \"cobolt-05\"; link = \"tcp:laser:1\"; power_w = 0.05;"
-             " warmup_s = 1.0; polarisation = \"u\"; };\n"
-             "detector: { driver = \"sr830\"; link = \"tcp:lockin:8000\"; time_constant_s = 0.001;"
-             " slope_db = 12; %s };\n%s\n"
-             "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; %s } );\n",
-             aux, more, places);
+    snprintf(
+        text, sizeof text,
+        "bench: { name = \"b\"; wavelength_nm = 1060.0; aperture_radius_mm = 8.0;\n"
+        "  u_aperture_radius_mm = 0.0; distance_mm = 500.0; u_distance_mm = 0.0; };\n"
+        "buses: ( { name = \"axes\"; link = \"modbus-tcp:axes:502\"; } );\n"
+        "axes: (\n" AXIS("theta_i", "1") "," AXIS(
+            "theta_r",
+            "2") " );\n"
+                 "laser: { driver = \"cobolt-05\"; link = \"tcp:laser:1\"; power_w = 0.05;"
+                 " warmup_s = 1.0; polarisation = \"u\"; };\n"
+                 "detector: { driver = \"sr830\"; link = \"tcp:lockin:8000\"; time_constant_s = "
+                 "0.001;"
+                 " slope_db = 12; %s };\n%s\n"
+                 "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; %s } );\n",
+        aux, more, places);
     return text;
 }
 
@@ -60,12 +65,13 @@ static void wrong(const char *text, const char *says)
 static void all_of_them_arrive(void **state)
 {
     (void)state;
-    struct bench_config b = right(bench(
-        "", "monitor: { driver = \"thorlabs-pm100\"; link = \"tcp:m:1\"; full_scale = 2e-3; };"
-            "devices: ( { " SHUTTER "position = \"open\"; darks = true; }, { " WHEEL
-            "position = \"1\"; safe = \"6\"; }, { " DOOR "bus = \"axes\"; unit = 9; } );",
-        "devices = ( { name = \"nd\"; position = \"2\"; transmission = 0.01; "
-        "u_transmission = 0.0001; } );"));
+    struct bench_config b = right(
+        bench("",
+              "monitor: { driver = \"thorlabs-pm100\"; link = \"tcp:m:1\"; full_scale = 2e-3; };"
+              "devices: ( { " SHUTTER "position = \"open\"; darks = true; }, { " WHEEL
+              "position = \"1\"; safe = \"6\"; }, { " DOOR "bus = \"axes\"; unit = 9; } );",
+              "devices = ( { name = \"nd\"; position = \"2\"; transmission = 0.01; "
+              "u_transmission = 0.0001; } );"));
     double u_rel;
     assert_string_equal(b.monitor.driver, "thorlabs-pm100");
     assert_true(b.monitor.full_scale == 2e-3);
@@ -89,8 +95,8 @@ static void all_of_them_arrive(void **state)
 static void a_monitor_is_one_thing(void **state)
 {
     (void)state;
-    wrong(bench("monitor_aux = 1;", "monitor: { driver = \"thorlabs-pm100\"; link = \"tcp:m:1\"; };",
-                ""),
+    wrong(bench("monitor_aux = 1;",
+                "monitor: { driver = \"thorlabs-pm100\"; link = \"tcp:m:1\"; };", ""),
           "b.cfg:7: detector.monitor_aux = 1: the bench has a monitor of its own in group monitor; "
           "one or the other, write 0\n");
     wrong(bench("", "monitor: { link = \"tcp:m:1\"; };", ""),
@@ -128,9 +134,9 @@ static void mistakes_of_devices_name_their_lines(void **state)
          "b.cfg:8: devices[0].unit: its address on the bus is missing; allowed 1..247\n"},
         {DEVICE(DOOR "bus = \"axes\"; unit = 9; link = \"tcp:d:1\";"),
          "b.cfg:8: devices[0].link = \"tcp:d:1\": a link or a bus, not both\n"},
-        {DEVICE(DOOR),
-         "b.cfg:8: devices[0].link: allowed serial:PORT, tcp:HOST:PORT or usbtmc:VID:PID:SERIAL; or "
-         "give bus and unit\n"},
+        {DEVICE(DOOR), "b.cfg:8: devices[0].link: allowed serial:PORT, tcp:HOST:PORT or "
+                       "usbtmc:VID:PID:SERIAL; or "
+                       "give bus and unit\n"},
         {DEVICE(DOOR "link = \"tcp:d:1\"; position = \"open\";"),
          "b.cfg:8: devices[0].position = \"open\": inputs are only read\n"},
         {"devices: ( { " WHEEL "position = \"1\"; }, { " WHEEL "position = \"2\"; } );",
@@ -157,9 +163,10 @@ static void mistakes_of_stations_name_their_lines(void **state)
                 "devices = ( { name = \"shutter\"; position = \"open\"; },"
                 " { name = \"shutter\"; position = \"closed\"; } );"),
           "b.cfg:9: stations[0].devices[1].name = \"shutter\": is placed twice at one station\n");
-    wrong(bench("", devices, "devices = ( { name = \"nd\"; position = \"2\"; } );"),
-          "b.cfg:9: stations[0].devices[0].transmission: nd filters the beam: what it passes of it, "
-          "over what it passes at \"1\", is missing; 1 when it stands before the monitor\n");
+    wrong(
+        bench("", devices, "devices = ( { name = \"nd\"; position = \"2\"; } );"),
+        "b.cfg:9: stations[0].devices[0].transmission: nd filters the beam: what it passes of it, "
+        "over what it passes at \"1\", is missing; 1 when it stands before the monitor\n");
     right(bench("", devices, "devices = ( { name = \"nd\"; position = \"1\"; } );"));
 }
 

@@ -227,7 +227,7 @@ static void a_station_has_its_filter_before_the_axes_come_and_until_they_left(vo
     assert_complete(r);
     assert_int_equal(r->devices.wheel.at, 0);
     assert_int_equal(r->devices.wheel.moves, 5); // 1, 2 beam, 1, 2 beam, 1
-    assert_values(r); // the beam was a tenth
+    assert_values(r);                            // the beam was a tenth
     end(r);
 }
 

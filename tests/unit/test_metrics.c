@@ -43,8 +43,10 @@ static struct instrument_snapshot bench(void)
     part(&s, PART_DEVICES + 1, "door", BUS, PART_OK);
     snprintf(s.device[0].position, sizeof s.device[0].position, "2");
     s.device[0].use = BENCH_FILTER;
-    s.device[1] = (struct device_state){
-        .use = BENCH_INPUTS, .values = 2, .value = {{"open", "", 1}, {"bench_c", "degC", (double)NAN}}};
+    s.device[1] =
+        (struct device_state){.use = BENCH_INPUTS,
+                              .values = 2,
+                              .value = {{"open", "", 1}, {"bench_c", "degC", (double)NAN}}};
     s.axis[PART_THETA_I].position = (double)NAN;
     s.axis[PART_THETA_R].position = -12.5;
     s.laser.power_w = (double)NAN;

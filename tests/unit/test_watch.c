@@ -70,7 +70,8 @@ static void describe(struct setting *s)
     }
     snprintf(s->bench.laser.driver, sizeof s->bench.laser.driver, "configs/profiles/cobolt-05.cfg");
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "serial:/nowhere/laser?baud=115200");
-    snprintf(s->bench.detector.driver, sizeof s->bench.detector.driver, "configs/profiles/sr830.cfg");
+    snprintf(s->bench.detector.driver, sizeof s->bench.detector.driver,
+             "configs/profiles/sr830.cfg");
     snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/lockin");
     s->bench.devices_count = 1;
     s->bench.devices[0] =
