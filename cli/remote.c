@@ -106,9 +106,10 @@ static void print_monitor(const json_t *d)
 {
     const json_t *full = json_object_get(d, "full_scale"), *last = json_object_get(d, "value");
     if (json_is_number(full))
-        printf("full scale %.4g%s", json_number_value(full), json_is_number(last) ? ", " : "");
+        printf("full scale %.4g %s%s", json_number_value(full), text_of(d, "unit"),
+               json_is_number(last) ? ", " : "");
     if (json_is_number(last))
-        printf("last %.4g", json_number_value(last));
+        printf("last %.4g %s", json_number_value(last), text_of(d, "unit"));
 }
 
 static void print_selector(const json_t *d)

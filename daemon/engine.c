@@ -270,14 +270,14 @@ static int readings_of(const struct engine *e)
 // Why no further attempt is made at a reading that is not good.
 static int no_more_attempts(struct engine *e, const struct acquire_reading *r)
 {
+    const char *unit = instrument_monitor_unit(e->in);
     if (r->flags & STORE_MONITOR_LOW) {
         int rc = engine_check_laser(e);
         return rc < 0 ? rc
                       : gon_fail(&e->why, GON_E_DEVICE,
-                                 "laser: says it emits, but the monitor fell to %.4g V from %.4g "
-                                 "V; look at "
-                                 "shutter and monitor, then: gonio resume",
-                                 r->monitor_v, e->monitor_lit_v);
+                                 "laser: says it emits, but the monitor fell to %.4g %s from %.4g "
+                                 "%s; look at shutter and monitor, then: gonio resume",
+                                 r->monitor_v, unit, e->monitor_lit_v, unit);
     }
     if (r->monitor_failed)
         return gon_fail(&e->why, GON_E_DEVICE,

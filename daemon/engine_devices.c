@@ -177,11 +177,12 @@ static int light_is_gone(struct engine *e, enum instrument_part part)
         rc = instrument_sample(e->in, &s, &e->why);
     if (rc < 0 || !(s.monitor_v - dark_v > STILL_LIT * (e->monitor_lit_v - dark_v)))
         return rc;
-    return gon_fail(&e->why, GON_E_DEVICE,
-                    "%s: says '%s', but the monitor still sees %.4g of %.4g; it is stuck, or the "
-                    "monitor stands before it (then darks = false), then: gonio resume",
-                    instrument_device(e->in, part)->name, instrument_selected(e->in, part),
-                    s.monitor_v, e->monitor_lit_v);
+    return gon_fail(
+        &e->why, GON_E_DEVICE,
+        "%s: says '%s', but the monitor still sees %.4g of %.4g %s; it is stuck, or the "
+        "monitor stands before it (then darks = false), then: gonio resume",
+        instrument_device(e->in, part)->name, instrument_selected(e->in, part), s.monitor_v,
+        e->monitor_lit_v, instrument_monitor_unit(e->in));
 }
 
 int engine_shut(struct engine *e)

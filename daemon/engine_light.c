@@ -99,6 +99,7 @@ static int wait_until_steady(struct engine *e)
     const double most_s = fmax(STEADY_LEAST_S, 2.0 * instrument_bench(e->in)->laser.warmup_s);
     const int64_t until_ns = clk_now_ns(e->ports->clk) + CLK_S(most_s);
     const double dark_v = isfinite(e->monitor_dark_v) ? e->monitor_dark_v : 0.0;
+    const char *unit = instrument_monitor_unit(e->in);
     double before_v, now_v;
     int rc = watch_monitor(e, &before_v);
     for (; rc >= 0; before_v = now_v) {
@@ -112,10 +113,10 @@ static int wait_until_steady(struct engine *e)
         if (clk_now_ns(e->ports->clk) > until_ns)
             return gon_fail(
                 &e->why, GON_E_DEVICE,
-                "laser: says it emits, but the monitor (%.4g V, dark %.4g V) still changes by "
+                "laser: says it emits, but the monitor (%.4g %s, dark %.4g %s) still changes by "
                 "%.2g %% in half a second after %.0f s; look at laser, shutter and monitor, "
                 "then: gonio resume",
-                now_v, dark_v, 100.0 * change, most_s);
+                now_v, unit, dark_v, unit, 100.0 * change, most_s);
         if (engine_pause_asked(e))
             return engine_operator_paused(e);
     }
@@ -155,7 +156,8 @@ static int light_up(struct engine *e)
     e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     e->acquire.range = -1;
-    engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g V", e->monitor_lit_v);
+    engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g %s", e->monitor_lit_v,
+               instrument_monitor_unit(e->in));
     return 0;
 }
 

@@ -2,8 +2,10 @@
 #include "daemon/instrument_devices.h"
 #include "daemon/instrument_inside.h"
 #include "drivers/device.h"
+#include "drivers/profile.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #define HEADROOM 2.0    // of the range that is chosen for the light
@@ -67,6 +69,13 @@ int instrument_connect_monitor(struct instrument *in, struct gon_error *err)
     if (rc >= 0)
         rc = m->detector->ops->identify(m->detector, p->identity, sizeof p->identity, err);
     return rc < 0 ? rc : set_up(in, err);
+}
+
+const char *instrument_monitor_unit(const struct instrument *in)
+{
+    const struct profile *p = in->monitor.profile;
+    const int signal = p ? profile_value(p, p->detector.signal) : -1;
+    return signal >= 0 ? p->values[signal].unit : "V";
 }
 
 double instrument_monitor_time_constant_s(const struct instrument *in)
@@ -176,6 +185,7 @@ void instrument_show_monitor(const struct instrument *in, struct instrument_snap
 {
     const struct monitor *m = &in->monitor;
     const bool known = m->detector && m->range >= 0;
+    snprintf(s->monitor_unit, sizeof s->monitor_unit, "%s", instrument_monitor_unit(in));
     s->monitor_range = known ? m->range : -1;
     s->monitor_full_scale = known ? full_scale(m, m->range) : (double)NAN;
 }

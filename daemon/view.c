@@ -80,6 +80,7 @@ static void add_detector(json_t *o, const struct instrument_snapshot *s)
 static void add_monitor(json_t *o, const struct instrument_snapshot *s)
 {
     json_object_set_new(o, "range", json_integer(s->monitor_range));
+    json_object_set_new(o, "unit", json_string(s->monitor_unit));
     json_object_set_new(o, "full_scale", view_number(s->monitor_full_scale));
     json_object_set_new(o, "value", view_number(s->monitor_v));
 }

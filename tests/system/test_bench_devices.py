@@ -166,6 +166,58 @@ def test_a_stuck_shutter_pauses_the_run_with_the_laser_off(bench, daemon):
     assert_measured(reply["file"])
 
 
+# --- inputs -----------------------------------------------------------------------------------------
+
+DOOR = r"""
+profile: { name = "door"; title = "I/O module"; role = "inputs"; protocol = "modbus"; source = "this test"; };
+values: (
+  { name = "kind"; type = "int"; address = 100; access = "r"; },
+  { name = "open"; type = "int"; table = "discrete"; address = 1; access = "r"; },
+  { name = "bench_c"; unit = "degC"; table = "input"; address = 1; format = "s16"; scale = 0.1; min = -40; max = 150;
+    access = "r"; },
+  { name = "alive"; type = "int"; table = "coil"; address = 6; access = "rw"; },
+  { name = "relay"; type = "int"; table = "discrete"; address = 9; access = "r"; },
+  { name = "left_ms"; address = 50; format = "s16"; access = "r"; } );
+writes: ( { name = "keep"; set = "alive = 1"; then = "left_ms = 600, relay = 1"; } );
+identify: { asks = "kind"; title = "I/O module"; refuse = ( { when = "kind != 4711"; text = "is no I/O module"; } ); };
+inputs: { status = ( "open", "bench_c", "relay" ); watchdog = "keep"; watchdog_ms = 600; };
+simulate: { start = ( { value = "kind"; is = "4711"; }, { value = "bench_c"; is = "21.5"; } );
+  drift = ( { value = "left_ms"; to = "0"; rate = 1000; then = "relay = 0"; } ); };
+"""
+
+
+def test_inputs_on_a_bus_are_seen_kept_and_missed(start_sim, start_daemon, tmp_path):
+    (tmp_path / "door.cfg").write_text(DOOR)
+    sim = start_sim("--fast", "--seed", "5", *QUICK_LASER)
+    door = start_sim("--profile", tmp_path / "door.cfg", "--unit", "9", folder=tmp_path / "door")
+    link = "modbus-tcp:" + door.control(do="state")["wires"]["door-tcp"]["address"].rsplit("/", 1)[-1]
+    text = (sim.folder / "goniod.cfg").read_text()
+    text = text.replace("buses: (", f'buses: ( {{ name = "io"; link = "{link}"; timeout_ms = 200; }},')
+    (tmp_path / "goniod.cfg").write_text(
+        text + 'devices: ( { name = "door"; driver = "./door.cfg"; bus = "io"; unit = 9; use = "inputs"; } );\n')
+    looked = gonio("doctor", tmp_path / "goniod.cfg", cwd=tmp_path)
+    assert looked.returncode == 0 and re.search(r"^door\twell\t.*open 0, bench_c 21\.5 degC", looked.stdout, re.M), looked
+    daemon = start_daemon("--config", tmp_path / "goniod.cfg")
+    status = daemon.gonio("status").stdout
+    assert re.search(r"^door +open 0, bench_c 21\.5 degC, relay [01]$", status, re.M), status
+    assert door.control(do="set", values={"open": 1})["ok"]
+    wait_for(lambda: re.search(r"^door +open 1", daemon.gonio("status").stdout, re.M))
+
+    wait_for(lambda: door.control(do="values")["values"]["relay"] == 1)
+
+    reply = daemon.submit(PLAN, "devices.cfg")
+    events = daemon.follow(0)
+    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1, 60.0)
+    assert door.control(do="mute", wire="door-tcp")["ok"]
+    paused = events.until_state(reply["run"], "paused")
+    assert "door" in paused["text"], paused
+    assert not sim.control(do="state")["laser"]["emission"]
+    assert door.control(do="unmute", wire="door-tcp")["ok"]
+    events.until_state(reply["run"], "done")
+    assert daemon.end() == 0
+    wait_for(lambda: door.control(do="values")["values"]["relay"] == 0)  # nobody keeps it on
+
+
 # --- what is said of them ---------------------------------------------------------------------------
 
 
@@ -173,7 +225,7 @@ def test_status_devices_metrics_and_doctor_know_them(bench, daemon):
     status = daemon.gonio("status").stdout
     assert re.search(r"^nd +4, measures at 1$", status, re.M), status
     assert re.search(r"^shutter +closed, measures at open$", status, re.M), status
-    assert re.search(r"^monitor +full scale 0\.01, last 0$", status, re.M), status
+    assert re.search(r"^monitor +full scale 0\.01 W, last 0 W$", status, re.M), status
     _, reply = daemon.request("GET", "/api/v1/devices")
     kinds = {d["name"]: d for d in reply["devices"]}
     assert [kinds[n]["kind"] for n in ("monitor", "shutter", "nd")] == ["monitor", "shutter", "filter"]
