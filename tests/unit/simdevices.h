@@ -21,8 +21,6 @@ struct simmonitor {
     int nonsense; // answers that are not numbers, to come
     double times; // the light is so much stronger than it should be; 1
     int restarts; // conditions "unsettled", to come
-    int64_t gone_until_ns;
-    double at_signal_v; // of the world's lock-in when it was read last
 };
 
 enum { SIMSELECTOR_POSITIONS = 3 };
@@ -38,7 +36,6 @@ struct simselector {
     bool slips; // is one further each time it is looked at
     double travel_s;
     int looks, moves;
-    int64_t gone_until_ns;
 };
 
 struct simdevices {
@@ -50,7 +47,8 @@ struct simdevices {
 static inline struct simmonitor *simmonitor_of(struct detector *d, struct gon_error *err, int *rc)
 {
     struct simmonitor *m = (struct simmonitor *)d;
-    *rc = simbench_now_ns(m->bench) < m->gone_until_ns ? gon_fail(err, GON_E_GONE, "hung up") : 0;
+    bool done;
+    *rc = simbench_call(m->bench, SIMBENCH_MONITOR, &done, err);
     return m;
 }
 
@@ -114,7 +112,6 @@ static inline int simmonitor_sample(struct detector *d, struct detector_sample *
     }
     const double full = simmonitor_full_scale(d, m->range);
     double power_w = m->times * SIMMONITOR_W_PER_V * world_aux_v(&m->bench->world, 1);
-    m->at_signal_v = lockin_x_v(&m->bench->world.lockin);
     if (power_w > full) {
         m->clipped = true;
         power_w = full;
@@ -162,9 +159,11 @@ static inline struct simselector *simselector_of(struct selector *z)
     return (struct simselector *)z;
 }
 
-static inline int simselector_call(struct simselector *s, struct gon_error *err)
+static inline int simselector_call(struct simselector *s, bool *ret_carried_out,
+                                   struct gon_error *err)
 {
-    return simbench_now_ns(s->bench) < s->gone_until_ns ? gon_fail(err, GON_E_GONE, "hung up") : 0;
+    return simbench_call(s->bench, s->is_shutter ? SIMBENCH_SHUTTER : SIMBENCH_WHEEL,
+                         ret_carried_out, err);
 }
 
 // By hand, too.
@@ -181,7 +180,8 @@ static inline void simselector_turn(struct simselector *s, int position)
 static inline int simselector_identify(struct selector *z, char *text, size_t size,
                                        struct gon_error *err)
 {
-    int rc = simselector_call(simselector_of(z), err);
+    bool done;
+    int rc = simselector_call(simselector_of(z), &done, err);
     if (rc >= 0)
         snprintf(text, size, "simulated selector");
     return rc;
@@ -209,7 +209,8 @@ static inline int simselector_where(struct selector *z, int *ret_position, bool 
                                     struct gon_error *err)
 {
     struct simselector *s = simselector_of(z);
-    int rc = simselector_call(s, err);
+    bool done;
+    int rc = simselector_call(s, &done, err);
     s->looks++;
     if (rc < 0)
         return rc;
@@ -225,20 +226,22 @@ static inline int simselector_where(struct selector *z, int *ret_position, bool 
 static inline int simselector_go(struct selector *z, int position, struct gon_error *err)
 {
     struct simselector *s = simselector_of(z);
-    int rc = simselector_call(s, err);
-    if (rc < 0 || s->at == position)
+    bool done;
+    int rc = simselector_call(s, &done, err);
+    if (!done || s->at == position)
         return rc;
     s->moves++;
     clk_sleep(&s->bench->clk.clk, CLK_S(s->travel_s), NULL);
     if (s->stuck)
         return gon_fail(err, GON_E_DEVICE, "does not go to '%s'; is it stuck?", s->names[position]);
     simselector_turn(s, position);
-    return 0;
+    return rc;
 }
 
 static inline int simselector_reopen(struct selector *z, struct gon_error *err)
 {
-    return simselector_call(simselector_of(z), err);
+    bool done;
+    return simselector_call(simselector_of(z), &done, err);
 }
 
 static inline void simselector_free(struct selector *z)

@@ -394,9 +394,9 @@ static void light_behind_a_shutter_that_says_closed_is_no_dark(void **state)
 
 static void unplug_wheel(struct run *r)
 {
-    if (!last_is(r, 1, 2) || r->devices.wheel.gone_until_ns)
+    if (!last_is(r, 1, 2) || r->b.gone_until_ns[SIMBENCH_WHEEL])
         return;
-    r->devices.wheel.gone_until_ns = r->b.clk.t_ns + CLK_S(20);
+    r->b.gone_until_ns[SIMBENCH_WHEEL] = r->b.clk.t_ns + CLK_S(20);
     simselector_turn(&r->devices.wheel, 2); // and comes back elsewhere
 }
 
@@ -418,6 +418,58 @@ static void an_unplugged_wheel_pauses_the_run_and_is_set_again(void **state)
     assert_int_equal(s.part[PART_SHUTTER].errors, 0);
     assert_string_equal(s.device[1].position, "1");
     end(r);
+}
+
+// Monitor, shutter that makes the darks, and a filter in the beam: each call of any device fails
+// once, every stride-th in turn.
+static void everything(struct bench_config *b)
+{
+    simdevices_monitor(b);
+    b->monitor.full_scale = 5e-3;
+    darks(b);
+    filtered_beam(b);
+}
+
+static void every_call_may_fail(int code, long first, long stride)
+{
+    for (long n = first;; n += stride) {
+        struct run *r = begin_with(everything);
+        r->plan.count = 0;
+        tiny_plan(r);
+        r->bench.laser.warmup_s = 0.5;
+        r->on_time = watch_beam;
+        r->b.fail_at = r->b.calls + n;
+        r->b.fail_code = code;
+        const enum run_state s = go(r);
+        const bool hit = r->b.hit_done;
+        if (s != RUN_DONE || r->violations)
+            print_error("call %ld with %s: %s\n", n, gon_code_name((enum gon_code)code),
+                        run_state_name(s));
+        assert_int_equal(s, RUN_DONE);
+        assert_complete(r);
+        assert_values(r);
+        end(r);
+        if (!hit)
+            break;
+    }
+}
+
+static void any_call_may_find_no_answer(void **state)
+{
+    (void)state;
+    every_call_may_fail(GON_E_LINK, 1, 2);
+}
+
+static void any_call_may_find_the_device_gone(void **state)
+{
+    (void)state;
+    every_call_may_fail(GON_E_GONE, 1, 3);
+}
+
+static void any_call_may_find_a_fault(void **state)
+{
+    (void)state;
+    every_call_may_fail(GON_E_DEVICE, 2, 3);
 }
 
 static void a_run_that_is_stopped_closes_the_shutter(void **state)
@@ -498,6 +550,9 @@ int main(void)
         cmocka_unit_test(a_shutter_that_closes_by_itself_switches_off_and_pauses),
         cmocka_unit_test(light_behind_a_shutter_that_says_closed_is_no_dark),
         cmocka_unit_test(an_unplugged_wheel_pauses_the_run_and_is_set_again),
+        cmocka_unit_test(any_call_may_find_no_answer),
+        cmocka_unit_test(any_call_may_find_the_device_gone),
+        cmocka_unit_test(any_call_may_find_a_fault),
         cmocka_unit_test(a_run_that_is_stopped_closes_the_shutter),
         cmocka_unit_test(any_with_a_safe_position_goes_there),
         cmocka_unit_test(a_position_that_it_has_not_is_a_mistake_of_the_bench),

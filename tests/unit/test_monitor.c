@@ -209,7 +209,7 @@ static void what_is_no_number_is_asked_again_and_never_stored(void **state)
 static void unplug(struct run *r)
 {
     if (is_then(r))
-        r->devices.monitor.gone_until_ns = r->b.clk.t_ns + CLK_S(30);
+        r->b.gone_until_ns[SIMBENCH_MONITOR] = r->b.clk.t_ns + CLK_S(30);
 }
 
 static void an_unplugged_one_pauses_the_run_until_it_is_back(void **state)
