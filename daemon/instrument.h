@@ -92,7 +92,7 @@ struct instrument_snapshot {
     double signal_v, monitor_v; // last sample; NAN: none
     int monitor_range;          // of a monitor of its own; -1: not known
     char monitor_unit[12];
-    double monitor_full_scale;  // in its unit; NAN: not known
+    double monitor_full_scale; // in its unit; NAN: not known
     struct device_state device[BENCH_DEVICES];
     double time_constant_s; // as the device has it
 };

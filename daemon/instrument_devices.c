@@ -83,7 +83,6 @@ static int connect_selector(struct instrument *in, struct companion *c, struct p
                  ? c->selector->ops->reopen(c->selector, err)
                  : device_open_selector(p->driver, in->bench->folder, &c->profile, p->address,
                                         &in->breathing.clk, NULL, &c->selector, err);
-    c->position = SELECTOR_ELSEWHERE;
     if (rc >= 0)
         rc = check_positions(in, c, err);
     if (rc >= 0)

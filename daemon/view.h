@@ -18,8 +18,9 @@ json_t *view_run(const struct run *run, bool with_fit);
 const char *view_kind(const struct instrument_snapshot *s, int part);
 // [{"name", "kind", "link", "address", "identity", "problem", "errors", "returns", then what
 // belongs to it}]; of an axis "unit", "position", "target" (user), "dial", "raw_steps", "moving",
-// "homed", "alarm", "alarm_code"; of a monitor "range", "unit", "full_scale", "value"; of a selector
-// "position" (null: at none) and "measures_at"; of inputs "values": [{"name", "unit", "value"}]
+// "homed", "alarm", "alarm_code"; of a monitor "range", "unit", "full_scale", "value"; of a
+// selector "position" (null: at none) and "measures_at"; of inputs "values": [{"name", "unit",
+// "value"}]
 json_t *view_devices(const struct instrument_snapshot *s);
 json_t *view_part(const struct instrument_snapshot *s, int part); // what belongs to it alone
 
