@@ -147,6 +147,16 @@ static const struct cfg_row station_rows[] = {
      .fallback = "",
      .rows = mark_rows,
      .help = "Where single axes stand, before what follows from the angles."},
+    {.name = "devices",
+     .type = CFG_GROUPS,
+     .offset = offsetof(struct bench_station, places),
+     .size = BENCH_DEVICES,
+     .stride = sizeof(struct bench_place),
+     .count_offset = offsetof(struct bench_station, places_count),
+     .fallback = "",
+     .rows = bench_place_rows,
+     .help = "Positions of devices there, instead of those they have otherwise; set before the "
+             "axes go there, and taken back after they have left."},
     {0}};
 
 static const struct cfg_row keep_out_rows[] = {
@@ -240,6 +250,15 @@ const struct cfg_row bench_config_schema[] = {
          "Where the axes must not go, not even in passing."),
     GROUP("laser", laser_rows, NULL, "The laser."),
     GROUP("detector", detector_rows, NULL, "The detector chain."),
+    {.name = "monitor",
+     .type = CFG_GROUP,
+     .offset = offsetof(struct bench_config, monitor),
+     .rows = bench_monitor_rows,
+     .fallback = "",
+     .help = "A detector of its own as reference monitor, read directly after each sample of the "
+             "detector; instead of detector.monitor_aux."},
+    MANY("devices", devices, BENCH_DEVICES, bench_device, bench_device_rows, "",
+         "Shutters, filter wheels, choppers and other selectors, and inputs."),
     {.name = "polarisation",
      .type = CFG_GROUP,
      .offset = offsetof(struct bench_config, polarisation),

@@ -4,6 +4,7 @@
 #pragma once
 #include "base/cfg.h"
 #include "base/err.h"
+#include "campaign/bench_devices.h"
 #include "campaign/bench_states.h"
 #include "campaign/kinematics.h"
 #include "campaign/polarisation.h"
@@ -88,6 +89,8 @@ struct bench_station {
     double theta_i_deg, theta_r_deg, sample_mm;
     struct bench_mark marks[BENCH_AXES];
     int marks_count;
+    struct bench_place places[BENCH_DEVICES]; // of devices, while the axes stand there
+    int places_count;
 };
 
 // Where two things would meet: a polygon in (theta_i, theta_r), deg, closed by itself.
@@ -128,6 +131,9 @@ struct bench_config {
     int keep_out_count;
     struct bench_laser laser;
     struct bench_detector detector;
+    struct bench_monitor monitor;
+    struct bench_device devices[BENCH_DEVICES];
+    int devices_count;
     struct bench_polarisation polarisation;
     struct bench_station stations[BENCH_STATIONS];
     int stations_count;

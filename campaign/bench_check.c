@@ -58,9 +58,9 @@ static int check_axis_name(struct cfg_file *f, const struct bench_config *b, int
     const bool is_sample = !strcmp(a->name, "sample");
     int mistakes = 0;
     if (!*a->name || a->name[strspn(a->name, "abcdefghijklmnopqrstuvwxyz0123456789_-")] ||
-        !strcmp(a->name, "laser") || !strcmp(a->name, "detector"))
+        !strcmp(a->name, "laser") || !strcmp(a->name, "detector") || !strcmp(a->name, "monitor"))
         mistakes += complain(f, "axes", i, "name",
-                             "allowed a-z, 0-9, _ and -, and neither laser nor detector");
+                             "allowed a-z, 0-9, _ and -, and not laser, detector or monitor");
     if (is_sample ? strcmp(a->unit_name, "mm")
                   : begins(a->name, "theta_", "theta_") && strcmp(a->unit_name, "deg"))
         mistakes +=
@@ -326,5 +326,5 @@ int bench_check(struct cfg_file *f, const struct bench_config *b)
         mistakes += cfg_complain(
             f, "stations", "station 'beam' is missing: where the detector looks into the beam");
     return mistakes + marks + outlines + maps + check_links(f, b) + check_notify(f, b) +
-           bench_states_check(f, b);
+           bench_devices_check(f, b) + bench_states_check(f, b);
 }

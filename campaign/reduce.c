@@ -322,9 +322,10 @@ static int add_channel(struct reduction *r, const struct references *f,
     *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};
     c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
                                             &c->u_analyser_rel);
+    c->beam_ratio /= bench_beam_passes(bench, &c->u_filter_rel);
     c->u_beam_rel = hypot(mean_u(&beam->ratio) / ratio,
                           hypot(noise, r->noise.rel_monitor) / sqrt(beam->samples));
-    c->u_scale_rel = hypot(hypot(c->u_beam_rel, c->u_analyser_rel), shared);
+    c->u_scale_rel = hypot(hypot(c->u_beam_rel, hypot(c->u_analyser_rel, c->u_filter_rel)), shared);
     r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
     r->u_scale_rel = fmax(r->u_scale_rel, c->u_scale_rel);
     r->polarisation = p->pol_in == POL_UNKNOWN || !r->channels ? p->pol_in : r->polarisation;

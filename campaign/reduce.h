@@ -15,6 +15,8 @@
 // beam's light (polarisation_passed) is multiplied in. Only a bench whose elements move knows of
 // either: without pol_out states in its file the analyser stood in the beam as on the sample.
 //
+// A filter that stands in the beam alone (bench_beam_passes) divides the beam by what it passes.
+//
 // u_A, uncorrelated from point to point: noise of signal and monitor, and of the dark. With four
 // samples a point the scatter of one point says little (its sd is uncertain by 40 %), and weights
 // from it would favour points that happened to scatter little. So one model for all,
@@ -24,10 +26,9 @@
 // Fluctuations of the laser that the monitor divides out count in both: u_A is rather too large
 // than too small.
 // u_B, common to all points of a channel (a pol_in and pol_out) as one factor: beam, 2u(r)/r,
-// 2u(d)/d, linearity, u(T)/T. Elements that pass up to a part e of crossed light add 0..e f_x to f;
-// u_B has e f_x/sqrt(3) of it (rectangular, not corrected), f_x being the reading of the crossed
-// state in the same direction where there is one, else f itself.
-// Thread: any.
+// 2u(d)/d, linearity, u(T)/T, the filter's. Elements that pass up to a part e of crossed light add
+// 0..e f_x to f; u_B has e f_x/sqrt(3) of it (rectangular, not corrected), f_x being the reading of
+// the crossed state in the same direction where there is one, else f itself. Thread: any.
 #pragma once
 #include "base/err.h"
 #include "campaign/bench.h"
@@ -58,7 +59,7 @@ struct reduce_reference { // means of the accepted readings; NAN where there is 
 struct reduce_channel {
     int pol_in, pol_out;
     double beam_ratio; // [(S0 - Ds0)/(M0 - Dm0)], as a reading of f = 1 per sr would divide it
-    double u_beam_rel, u_analyser_rel;
+    double u_beam_rel, u_analyser_rel, u_filter_rel;
     double u_scale_rel; // these and what all channels share
 };
 

@@ -4,6 +4,7 @@
 
 #include "campaign/bench.h"
 #include "campaign/config.h"
+#include "cli/check_inside.h"
 #include "cli/out.h"
 #include "cli/verb.h"
 #include "drivers/link.h"
@@ -113,7 +114,7 @@ int check_campaign(const char *path, struct campaign_config *ret_config, char **
 
 // --- links: campaign/ keeps them as text, drivers/ knows what they may say ----------------------
 
-static int line_of(const char *text, const char *word)
+int check_line_of(const char *text, const char *word)
 {
     const char *at = strstr(text, word);
     int line = 1;
@@ -122,8 +123,8 @@ static int line_of(const char *text, const char *word)
     return line;
 }
 
-static int check_link(const char *path, const char *text, const char *link, enum link_use use,
-                      struct cfg_sink sink)
+int check_link(const char *path, const char *text, const char *link, enum link_use use,
+               struct cfg_sink sink)
 {
     struct link l;
     struct gon_error err;
@@ -131,7 +132,7 @@ static int check_link(const char *path, const char *text, const char *link, enum
     int rc = link_parse(link, use, &l, &err);
     if (rc >= 0)
         return 0;
-    snprintf(line, sizeof line, "%s:%d: %s", path, line_of(text, link), err.text);
+    snprintf(line, sizeof line, "%s:%d: %s", path, check_line_of(text, link), err.text);
     sink.say(sink.ctx, line);
     return rc;
 }
@@ -150,16 +151,15 @@ static int check_role(const struct bench_config *bench, const char *name, enum p
     return rc;
 }
 
-// A device's profile has to be there, right, and of such a device.
-static int check_profile(const char *path, const char *text, const struct bench_config *bench,
-                         const char *name, enum profile_role role, struct cfg_sink sink)
+int check_profile(const char *path, const char *text, const struct bench_config *bench,
+                  const char *name, enum profile_role role, struct cfg_sink sink)
 {
     struct gon_error err;
     char line[800];
     int rc = check_role(bench, name, role, &err);
     if (rc >= 0)
         return 0;
-    snprintf(line, sizeof line, "%s:%d: driver: %s", path, line_of(text, name), err.text);
+    snprintf(line, sizeof line, "%s:%d: driver: %s", path, check_line_of(text, name), err.text);
     sink.say(sink.ctx, line);
     return rc;
 }
@@ -182,6 +182,8 @@ static int load_bench(const char *path, struct bench_config *bench, struct cfg_s
         if ((rc = check_link(path, text, bench->buses[i].link, LINK_MODBUS, sink)) < 0)
             worst = rc;
     if ((rc = check_link(path, text, bench->detector.link, LINK_TEXT, sink)) < 0)
+        worst = rc;
+    if ((rc = check_devices(path, text, bench, sink)) < 0)
         worst = rc;
     free(text);
     return worst;

@@ -2,6 +2,7 @@
 #include "cli/examine.h"
 
 #include "campaign/bench.h"
+#include "cli/examine_inside.h"
 #include "cli/ports.h"
 #include "drivers/axis.h"
 #include "drivers/bus.h"
@@ -19,9 +20,7 @@
 
 enum { IDENTITY = 128 };
 
-static void tell(const struct examine *e, struct finding *f, const char *fmt, ...)
-    __attribute__((format(printf, 3, 4)));
-static void tell(const struct examine *e, struct finding *f, const char *fmt, ...)
+void examine_tell(const struct examine *e, struct finding *f, const char *fmt, ...)
 {
     va_list who;
     va_start(who, fmt);
@@ -37,15 +36,15 @@ static struct link taken_apart(const char *text, enum link_use use)
     return l;
 }
 
-static void tell_open(const struct examine *e, const char *who, const char *text, enum link_use use,
-                      const struct gon_error *err)
+void examine_tell_open(const struct examine *e, const char *who, const char *text,
+                       enum link_use use, const struct gon_error *err)
 {
     struct finding f;
     char ports[600];
     const struct link l = taken_apart(text, use);
     ports_text(e->by_id, ports, sizeof ports);
     explain_open(&f, err, &l, ports);
-    tell(e, &f, "%s", who);
+    examine_tell(e, &f, "%s", who);
 }
 
 // --- first contact -------------------------------------------------------------------------------
@@ -150,19 +149,19 @@ static bool tell_instead(const struct examine *e, const char *who, const char *e
         explain_emission(&f);
     else
         return false;
-    tell(e, &f, "%s", who);
+    examine_tell(e, &f, "%s", who);
     return true;
 }
 
-static void tell_talk(const struct examine *e, const char *part, const char *port,
-                      const char *driver, const struct gon_error *err)
+void examine_tell_talk(const struct examine *e, const char *part, const char *port,
+                       const char *driver, const struct gon_error *err)
 {
     struct finding f;
     const struct link l = taken_apart(port, LINK_TEXT);
     if (err->code != GON_E_GONE && tell_instead(e, part, part, port))
         return;
     explain_talk(&f, err, &l, driver);
-    tell(e, &f, "%s", part);
+    examine_tell(e, &f, "%s", part);
 }
 
 // --- laser ---------------------------------------------------------------------------------------
@@ -176,16 +175,16 @@ static void tell_laser(const struct examine *e, struct laser *l, const char *ide
     int rc = l->ops->status(l, &s, &err);
     if (rc >= 0 && s.emission && (rc = l->ops->off(l, &err)) >= 0) { // it lit after it was off
         explain_relit(&f);
-        tell(e, &f, "laser");
+        examine_tell(e, &f, "laser");
         rc = l->ops->status(l, &s, &err);
     }
     if (rc < 0) {
-        tell_talk(e, "laser", link, e->bench->laser.driver, &err);
+        examine_tell_talk(e, "laser", link, e->bench->laser.driver, &err);
         return;
     }
     if (!explain_laser(&f, &s, l->ops->fault_text(l, s.fault_code)))
         explain_well(&f, "%s: told OFF first, reads back off; interlock closed", identity);
-    tell(e, &f, "laser");
+    examine_tell(e, &f, "laser");
 }
 
 static void examine_laser(const struct examine *e)
@@ -204,12 +203,12 @@ static void examine_laser(const struct examine *e)
         tell_laser(e, l, identity);
         l->ops->free(l);
     } else if (!opened) {
-        tell_open(e, "laser", config->link, LINK_TEXT, &err);
+        examine_tell_open(e, "laser", config->link, LINK_TEXT, &err);
     } else if (strstr(err.text, MAY_BE_ON)) {
         explain_emission(&f);
-        tell(e, &f, "laser");
+        examine_tell(e, &f, "laser");
     } else {
-        tell_talk(e, "laser", config->link, config->driver, &err);
+        examine_tell_talk(e, "laser", config->link, config->driver, &err);
     }
     free(profile);
 }
@@ -225,14 +224,14 @@ static void tell_detector(const struct examine *e, struct detector *d, const cha
     if (rc >= 0)
         rc = d->ops->condition(d, &flags, &err);
     if (rc < 0) {
-        tell_talk(e, "detector", e->bench->detector.link, e->bench->detector.driver, &err);
+        examine_tell_talk(e, "detector", e->bench->detector.link, e->bench->detector.driver, &err);
         return;
     }
     if (flags & DETECTOR_UNLOCKED)
         explain_no_reference(&f);
     else
         explain_well(&f, "%s", identity);
-    tell(e, &f, "detector");
+    examine_tell(e, &f, "detector");
 }
 
 static void examine_detector(const struct examine *e)
@@ -250,9 +249,9 @@ static void examine_detector(const struct examine *e)
         tell_detector(e, d, identity);
         d->ops->free(d);
     } else if (!opened) {
-        tell_open(e, "detector", config->link, LINK_TEXT, &err);
+        examine_tell_open(e, "detector", config->link, LINK_TEXT, &err);
     } else {
-        tell_talk(e, "detector", config->link, config->driver, &err);
+        examine_tell_talk(e, "detector", config->link, config->driver, &err);
     }
     free(profile);
 }
@@ -336,7 +335,7 @@ static void tell_axes(const struct examine *e, const struct link *l, const struc
             explain_unit(&f, k->config->unit, answering);
         else
             explain_talk(&f, &k->err, l, k->config->driver);
-        tell(e, &f, "axis %s", k->config->name);
+        examine_tell(e, &f, "axis %s", k->config->name);
     }
 }
 
@@ -356,7 +355,7 @@ static void tell_bus(const struct examine *e, const struct bench_bus *bus, const
     if (tell_instead(e, who, "axes", bus->link))
         return;
     explain_bus(&f, &l, bus->link, silent);
-    tell(e, &f, "%s", who);
+    examine_tell(e, &f, "%s", who);
 }
 
 static void examine_bus(const struct examine *e, const struct bench_bus *config)
@@ -375,7 +374,7 @@ static void examine_bus(const struct examine *e, const struct bench_bus *config)
         return;
     snprintf(who, sizeof who, "bus %s", config->name);
     if (bus_open(config->link, config->timeout_ms, QUIET_MS, e->clk, NULL, &bus, &err) < 0) {
-        tell_open(e, who, config->link, LINK_MODBUS, &err);
+        examine_tell_open(e, who, config->link, LINK_MODBUS, &err);
         return;
     }
     for (int i = 0; i < count; i++)
@@ -390,4 +389,5 @@ void examine_bench(const struct examine *e)
     for (int i = 0; i < e->bench->buses_count; i++)
         examine_bus(e, &e->bench->buses[i]);
     examine_detector(e);
+    examine_devices(e);
 }

@@ -102,6 +102,39 @@ static void print_detector(const json_t *d)
     }
 }
 
+static void print_monitor(const json_t *d)
+{
+    const json_t *full = json_object_get(d, "full_scale"), *last = json_object_get(d, "value");
+    if (json_is_number(full))
+        printf("full scale %.4g %s%s", json_number_value(full), text_of(d, "unit"),
+               json_is_number(last) ? ", " : "");
+    if (json_is_number(last))
+        printf("last %.4g %s", json_number_value(last), text_of(d, "unit"));
+}
+
+static void print_selector(const json_t *d)
+{
+    const char *position = text_of(d, "position");
+    printf("%s, measures at %s", *position ? position : "at none of its positions",
+           text_of(d, "measures_at"));
+}
+
+static void print_inputs(const json_t *d)
+{
+    const json_t *v;
+    size_t i;
+    json_array_foreach(json_object_get(d, "values"), i, v)
+    {
+        const json_t *number = json_object_get(v, "value");
+        const char *unit = text_of(v, "unit");
+        printf("%s%s ", i ? ", " : "", text_of(v, "name"));
+        if (json_is_number(number))
+            printf("%.6g%s%s", json_number_value(number), *unit ? " " : "", unit);
+        else
+            printf("?");
+    }
+}
+
 static void print_lost(const json_t *d)
 {
     printf("%sLOST%s: %s", out_begin(stdout, OUT_RED), out_end(stdout), text_of(d, "problem"));
@@ -121,6 +154,12 @@ static void print_device(const json_t *d)
         print_laser(d);
     else if (!strcmp(name, "detector"))
         print_detector(d);
+    else if (!strcmp(name, "monitor"))
+        print_monitor(d);
+    else if (json_object_get(d, "measures_at"))
+        print_selector(d);
+    else if (json_object_get(d, "values"))
+        print_inputs(d);
     else
         print_axis(d);
     putchar('\n');

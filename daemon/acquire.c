@@ -4,6 +4,7 @@
 #include "campaign/bench.h"
 #include "campaign/plan.h"
 #include "campaign/store.h"
+#include "daemon/instrument_devices.h"
 
 #include <math.h>
 
@@ -42,12 +43,22 @@ static int64_t settled_ns(struct instrument *in, int64_t since_ns, double residu
     return since_ns + CLK_S(detector_settle_s(instrument_time_constant_s(in), slope_db, residual));
 }
 
-static int settle(struct instrument *in, const struct acquire *a, int64_t since_ns,
+// A monitor of its own sees no axis move, and may be slower than the detector.
+static int64_t monitor_settled_ns(struct instrument *in, int64_t since_ns)
+{
+    const double time_constant_s = instrument_monitor_time_constant_s(in);
+    const int slope_db = instrument_bench(in)->detector.slope_db;
+    return since_ns + CLK_S(detector_settle_s(time_constant_s, slope_db, ACQUIRE_RESIDUAL));
+}
+
+static int settle(struct instrument *in, const struct acquire *a, const struct acquire_wish *wish,
                   const struct cancel *cancel, struct gon_error *err)
 {
-    const int64_t light_ns = settled_ns(in, since_ns, ACQUIRE_RESIDUAL);
+    const int64_t light_ns = settled_ns(in, wish->since_ns, ACQUIRE_RESIDUAL);
     const int64_t range_ns = settled_ns(in, a->range_ns, ACQUIRE_RESIDUAL);
-    if (instrument_wait(in, light_ns > range_ns ? light_ns : range_ns, cancel) < 0)
+    const int64_t monitor_ns = monitor_settled_ns(in, wish->source_ns);
+    const int64_t both_ns = light_ns > range_ns ? light_ns : range_ns;
+    if (instrument_wait(in, both_ns > monitor_ns ? both_ns : monitor_ns, cancel) < 0)
         return gon_fail(err, GON_E_CANCELED, "stopped while settling");
     return 0;
 }
@@ -173,6 +184,8 @@ static void judge(struct instrument *in, struct acquire *a, struct acquire_readi
     } else if (r->flags & (STORE_UNLOCKED | STORE_UNSETTLED)) {
         r->again = true;
         a->set_up = (r->flags & STORE_UNSETTLED) != 0; // somebody changed it, or it restarted
+    } else if (r->monitor_failed) {
+        r->again = true;
     } else {
         r->accepted = true;
         if (r->range < top && signal_v > NEARLY_FULL * instrument_full_scale_v(in, r->range))
@@ -205,16 +218,18 @@ int acquire_attempt(struct instrument *in, struct acquire *a, const struct acqui
     int rc = change_range(in, a, err);
     r.range = a->range;
     if (rc >= 0)
-        rc = settle(in, a, wish->since_ns, cancel, err);
+        rc = settle(in, a, wish, cancel, err);
     if (rc >= 0) // what happened on the way
         rc = instrument_clear(in, err);
     if (rc >= 0)
         rc = take_samples(in, a, wish, cancel, &r, err);
     if (rc >= 0)
         rc = instrument_condition(in, &condition, err);
+    if (rc >= 0)
+        rc = instrument_monitor_failed(in, &r.monitor_failed, err);
     if (rc < 0)
         return rc;
-    r.flags |= store_flags(condition);
+    r.flags |= store_flags(condition) | (r.monitor_failed ? STORE_DISCARDED : 0);
     judge(in, a, &r);
     *ret_reading = r;
     return 0;

@@ -33,8 +33,9 @@ struct acquire {
 };
 
 struct acquire_wish {
-    int count;              // samples, 1..1000
-    int64_t since_ns;       // when the light last changed: arrival, laser on or off
+    int count;         // samples, 1..1000
+    int64_t since_ns;  // when the light last changed: arrival, laser on or off
+    int64_t source_ns; // when that of the source did: what a monitor of its own has to settle from
     double monitor_least_v; // below it the light was lost; NAN: not checked
 };
 
@@ -44,6 +45,7 @@ struct acquire_reading {
     double signal_v, signal_sd_v;   // mean, sample sd (0 for one sample)
     double monitor_v, monitor_sd_v; // NAN: no monitor
     unsigned flags;                 // of store.h
+    bool monitor_failed;            // a monitor of its own was beyond its range, or unsettled
     bool accepted;
     bool again; // not accepted, and another attempt may mend it (the range was changed in acquire)
 };

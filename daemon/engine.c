@@ -11,6 +11,7 @@
 #include "daemon/acquire.h"
 #include "daemon/engine_inside.h"
 #include "daemon/instrument.h"
+#include "daemon/instrument_devices.h"
 #include "daemon/travel.h"
 
 #include <math.h>
@@ -146,9 +147,12 @@ static void provisional(const struct engine *e, const struct acquire_reading *r,
     const bool monitored = isfinite(r->monitor_v);
     const double signal_v = r->signal_v - o->dark_signal_v;
     const int in = e->point->pol_in;
+    double u_rel;
+    const double passes = bench_beam_passes(instrument_bench(e->in), &u_rel);
     const double beam = (o->beam_signal_v[in] - o->dark_signal_v) /
                         (monitored ? o->beam_monitor_v[in] - o->dark_monitor_v : 1.0);
-    const double ratio = signal_v / (monitored ? r->monitor_v - o->dark_monitor_v : 1.0) / beam;
+    const double ratio =
+        passes * signal_v / (monitored ? r->monitor_v - o->dark_monitor_v : 1.0) / beam;
     const double cosine = cos(
         units_rad(instrument_bench(e->in)->regime == BENCH_OVERFILLED ? theta_i_deg : theta_r_deg));
     const double u_signal_v = u_of_mean(r->signal_sd_v, r->count);
@@ -228,6 +232,7 @@ static int prepare(struct engine *e)
         rc = instrument_connect(e->in, instrument_lost(e->in), &e->why);
     if (rc >= 0)
         rc = travel_home(e->in, e->ports->cancel, &e->why);
+    e->devices_sweep = -1;
     e->ready = rc >= 0;
     e->pace_ns = 0;
     instrument_permit(e->in, e->ready);
@@ -235,17 +240,22 @@ static int prepare(struct engine *e)
     return rc;
 }
 
-// A dark needs no place: it is measured where the axes are, unless the plan says where.
+// A dark needs no place: it is measured where the axes are, unless the plan says where. A filter
+// that a station asks for is in before the axes go there, and out after they have left.
 static int go_to(struct engine *e, struct travel_pose *ret_at)
 {
     const struct plan_point *p = e->point;
     struct travel_pose pose = travel_stay();
-    int rc = engine_turn_elements(e);
+    int rc = engine_station_places(e) ? engine_place_devices(e) : 0;
+    if (rc >= 0)
+        rc = engine_turn_elements(e);
     if (rc >= 0 && p->kind == PLAN_SAMPLE)
         rc = travel_to_sample(e->in, p->theta_i_deg, p->theta_r_deg, &pose, &e->why);
     else if (rc >= 0 && (p->kind != PLAN_DARK || p->station[0]))
         rc = travel_station(e->in, p->station, &pose, &e->why);
-    return rc < 0 ? rc : travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
+    if (rc >= 0)
+        rc = travel_move(e->in, &pose, e->ports->cancel, ret_at, &e->why);
+    return rc < 0 ? rc : engine_place_devices(e);
 }
 
 static int readings_of(const struct engine *e)
@@ -260,15 +270,20 @@ static int readings_of(const struct engine *e)
 // Why no further attempt is made at a reading that is not good.
 static int no_more_attempts(struct engine *e, const struct acquire_reading *r)
 {
+    const char *unit = instrument_monitor_unit(e->in);
     if (r->flags & STORE_MONITOR_LOW) {
         int rc = engine_check_laser(e);
         return rc < 0 ? rc
                       : gon_fail(&e->why, GON_E_DEVICE,
-                                 "laser: says it emits, but the monitor fell to %.4g V from %.4g "
-                                 "V; look at "
-                                 "shutter and monitor, then: gonio resume",
-                                 r->monitor_v, e->monitor_lit_v);
+                                 "laser: says it emits, but the monitor fell to %.4g %s from %.4g "
+                                 "%s; look at shutter and monitor, then: gonio resume",
+                                 r->monitor_v, unit, e->monitor_lit_v, unit);
     }
+    if (r->monitor_failed)
+        return gon_fail(&e->why, GON_E_DEVICE,
+                        "monitor: beyond its range or unsettled in %d attempts; look at it and at "
+                        "its full_scale in the bench file, then: gonio resume",
+                        e->attempt);
     const char *what = r->flags & STORE_SATURATED  ? "saturated on its least sensitive range"
                        : r->flags & STORE_UNLOCKED ? "has no reference (chopper stopped?)"
                                                    : "gives no usable reading";
@@ -288,12 +303,17 @@ static double least_monitor_v(const struct engine *e)
 
 static int measure(struct engine *e, const struct travel_pose *at)
 {
-    const struct acquire_wish wish = {readings_of(e), e->light_ns, least_monitor_v(e)};
+    struct acquire_wish wish = {.count = readings_of(e), .monitor_least_v = least_monitor_v(e)};
     const int most = instrument_ranges(e->in) + ATTEMPTS_MORE;
     struct acquire_reading r = {0};
     acquire_begin(&e->acquire);
+    e->sought = 0;
     for (int k = 0; k < most; k++) {
+        wish.since_ns = e->light_ns;
+        wish.source_ns = e->source_ns;
         int rc = acquire_attempt(e->in, &e->acquire, &wish, e->ports->cancel, &r, &e->why);
+        if (rc >= 0)
+            rc = engine_confirm_devices(e, &r);
         if (rc < 0)
             return rc;
         e->attempt++;
@@ -307,6 +327,12 @@ static int measure(struct engine *e, const struct travel_pose *at)
             begin_pace(e);
         }
         publish_reading(e, &r, at);
+        if (r.monitor_failed)
+            engine_say(e, ENGINE_LOG, "notice",
+                       "monitor: beyond its range or unsettled; the reading is discarded");
+        rc = e->ready ? engine_seek_device(e) : 0;
+        if (rc < 0)
+            return rc;
         if (r.accepted || !r.again)
             break;
         if (!e->ready) // the store paused the run: light and axes first
@@ -323,6 +349,10 @@ static int do_point(struct engine *e)
     if (engine_pause_asked(e))
         return engine_operator_paused(e);
     int rc = prepare(e);
+    if (rc >= 0)
+        rc = instrument_watch_inputs(e->in, &e->why);
+    if (rc >= 0 && !e->lit && e->point->kind != PLAN_DARK && instrument_bench(e->in)->devices_count)
+        rc = go_to(e, &at); // out of the beam, or with its filter, before there is light
     if (rc >= 0)
         rc = engine_light_for(e);
     if (rc >= 0)

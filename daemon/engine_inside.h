@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_light.c (the
-// laser's part) and engine_elements.c (the elements of polarisation) share; nobody else includes
-// it.
+// laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
+// filter wheels and the like) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
@@ -20,11 +20,15 @@ struct engine {
     int done, attempt;
     bool ready;  // connected, homed
     bool lit;    // laser on, warmed up, monitor steady
-    bool dark;   // laser off, read back at this campaign's own request
+    bool dark;   // laser off, read back at this campaign's own request; or the shutter closed that
+                 // makes the darks
     bool wanted; // the pause is the operator's
     int returns; // pauses that ended by themselves since the last accepted reading
-    int64_t light_ns, laser_look_ns;
+    int64_t light_ns, source_ns, laser_look_ns; // light_ns: also of arrivals
     struct acquire acquire;
+    int devices_sweep;            // in which all selectors were read back; -1: none
+    unsigned sought;              // selectors that were set again at this point, a bit each
+    enum instrument_part strayed; // found elsewhere after the last reading; PART_COUNT: none
 
     double omega_sr, monitor_dark_v, monitor_lit_v;
     struct engine_opening opening;
@@ -43,8 +47,8 @@ void engine_say(struct engine *e, enum engine_event_kind kind, const char *level
 void engine_enter(struct engine *e, enum run_state state, const char *text);
 
 // --- engine_pause.c ---
-int engine_canceled(struct engine *e);        // GON_E_CANCELED
-int engine_nap(struct engine *e, int64_t ns); // GON_E_CANCELED
+int engine_canceled(struct engine *e);                 // GON_E_CANCELED
+int engine_nap(struct engine *e, int64_t ns);          // GON_E_CANCELED
 const char *engine_light_text(const struct engine *e); // what may be said of the laser
 void engine_make_safe(struct engine *e);               // emission off, axes stopped
 // RUN_PAUSED; where the laser is not known to be off the text begins with that.
@@ -57,6 +61,19 @@ int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
 // --- engine_elements.c ---
 // To the point's states; what stands there already is only looked at, now and then.
 int engine_turn_elements(struct engine *e);
+
+// --- engine_devices.c ---
+// Selectors to where the point has them; all are read back once in each sweep.
+int engine_place_devices(struct engine *e);
+// Whether the point's station has any of them elsewhere than usual.
+bool engine_station_places(const struct engine *e);
+// All read back after a reading: with one elsewhere the reading does not count. Then, once it is
+// stored, that one is set again, the first time at a point.
+int engine_confirm_devices(struct engine *e, struct acquire_reading *r);
+int engine_seek_device(struct engine *e);
+// The shutter that makes the darks, if there is one: closed, and no light behind it.
+bool engine_shutter_darkens(const struct engine *e);
+int engine_shut(struct engine *e);
 
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.

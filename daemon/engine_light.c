@@ -3,6 +3,7 @@
 
 #include "campaign/bench.h"
 #include "campaign/plan.h"
+#include "daemon/instrument_devices.h"
 
 #include <math.h>
 
@@ -98,6 +99,7 @@ static int wait_until_steady(struct engine *e)
     const double most_s = fmax(STEADY_LEAST_S, 2.0 * instrument_bench(e->in)->laser.warmup_s);
     const int64_t until_ns = clk_now_ns(e->ports->clk) + CLK_S(most_s);
     const double dark_v = isfinite(e->monitor_dark_v) ? e->monitor_dark_v : 0.0;
+    const char *unit = instrument_monitor_unit(e->in);
     double before_v, now_v;
     int rc = watch_monitor(e, &before_v);
     for (; rc >= 0; before_v = now_v) {
@@ -111,10 +113,10 @@ static int wait_until_steady(struct engine *e)
         if (clk_now_ns(e->ports->clk) > until_ns)
             return gon_fail(
                 &e->why, GON_E_DEVICE,
-                "laser: says it emits, but the monitor (%.4g V, dark %.4g V) still changes by "
+                "laser: says it emits, but the monitor (%.4g %s, dark %.4g %s) still changes by "
                 "%.2g %% in half a second after %.0f s; look at laser, shutter and monitor, "
                 "then: gonio resume",
-                now_v, dark_v, 100.0 * change, most_s);
+                now_v, unit, dark_v, unit, 100.0 * change, most_s);
         if (engine_pause_asked(e))
             return engine_operator_paused(e);
     }
@@ -134,6 +136,8 @@ static int warm_up(struct engine *e)
         if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
             rc = engine_check_laser(e);
     }
+    if (rc >= 0)
+        rc = instrument_fit_monitor(e->in, &e->why);
     return rc < 0 ? rc : wait_until_steady(e);
 }
 
@@ -149,22 +153,26 @@ static int light_up(struct engine *e)
     if (rc < 0)
         return rc;
     e->lit = true;
-    e->dark = false;
-    e->light_ns = clk_now_ns(e->ports->clk);
+    e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     e->acquire.range = -1;
-    engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g V", e->monitor_lit_v);
+    engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g %s", e->monitor_lit_v,
+               instrument_monitor_unit(e->in));
     return 0;
 }
 
+// With a shutter for it the laser stays as it is, warm.
 static int lights_out(struct engine *e)
 {
-    int rc = instrument_emission_off(e->in, &e->why);
+    int rc = engine_shut(e);
+    const bool stays = rc >= 0 && e->lit && engine_shutter_darkens(e);
+    if (rc >= 0 && !stays)
+        rc = instrument_emission_off(e->in, &e->why);
     if (rc < 0)
         return rc;
-    e->lit = false;
+    e->lit = stays;
     e->dark = true;
-    e->light_ns = clk_now_ns(e->ports->clk);
+    e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->acquire.range = -1;
     return 0;
 }
@@ -173,5 +181,6 @@ int engine_light_for(struct engine *e)
 {
     if (e->point->kind == PLAN_DARK)
         return e->dark ? 0 : lights_out(e);
+    e->dark = false; // a shutter that made the dark opens when the devices are placed
     return e->lit ? 0 : light_up(e);
 }

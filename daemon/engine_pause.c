@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/engine_inside.h"
 
+#include "daemon/instrument_devices.h"
 #include "daemon/travel.h"
 
 #include <stdio.h>
@@ -36,6 +37,8 @@ void engine_make_safe(struct engine *e)
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
         engine_say(e, ENGINE_LOG, "err", "%s", err.text);
     travel_stop(e->in, NULL);
+    if (instrument_devices_safe(e->in, &err) < 0)
+        engine_say(e, ENGINE_LOG, "err", "%s", err.text);
 }
 
 static bool resume_asked(struct engine *e)
@@ -75,9 +78,9 @@ static int name_lost(const struct engine *e, char *text, size_t size)
         next = next_lost(&s, i + 1);
         const bool shared = next < PART_COUNT && !strcmp(p->address, s.part[next].address);
         const bool told = *p->address && !shared;
-        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s",
-                                   lost++ ? ", " : "", i < INSTRUMENT_AXES ? "axis " : "", p->name,
-                                   told ? " (" : "", told ? p->address : "", told ? ")" : "");
+        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s", lost++ ? ", " : "",
+                                   i < INSTRUMENT_AXES ? "axis " : "", p->name, told ? " (" : "",
+                                   told ? p->address : "", told ? ")" : "");
     }
     return lost;
 }

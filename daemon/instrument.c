@@ -42,8 +42,11 @@ static void breathing_sleep_until(struct clk *clk, int64_t t_ns, const struct ca
 
 void instrument_breathe(struct instrument *in)
 {
+    const int talking = in->talking; // a driver that waits in the middle of its talk
     if (in->safety && safety_tick(in->safety))
         instrument_emission_off(in, NULL);
+    in->talking = talking;
+    instrument_keep_relays(in);
     if (in->watcher)
         in->watcher(in->watcher_ctx);
 }
@@ -74,6 +77,7 @@ void instrument_watch(struct instrument *in, void (*watcher)(void *ctx), void *c
 int instrument_note(struct instrument *in, enum instrument_part part, int rc, struct gon_error *err)
 {
     struct part_state *p = &in->part[part];
+    in->talking = PART_COUNT;
     if (rc >= 0) {
         if (p->link == PART_LOST)
             p->returns++;
@@ -94,17 +98,20 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc, st
     return rc;
 }
 
-static bool is_part_there(const struct instrument *in, enum instrument_part part)
+bool instrument_is_there(const struct instrument *in, enum instrument_part part)
 {
-    return part < INSTRUMENT_AXES ? in->motor[part].axis != NULL
-           : part == PART_LASER   ? in->safety != NULL
-                                  : in->detector != NULL;
+    return part < INSTRUMENT_AXES  ? in->motor[part].axis != NULL
+           : part == PART_LASER    ? in->safety != NULL
+           : part == PART_DETECTOR ? in->detector != NULL
+           : part == PART_MONITOR  ? in->monitor.detector != NULL
+                                   : instrument_device_there(in, part);
 }
 
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err)
 {
     assert(in->part[part].link != PART_ABSENT);
-    if (is_part_there(in, part))
+    in->talking = (int)part;
+    if (instrument_is_there(in, part))
         return 0;
     return instrument_note(
         in, part, gon_fail(err, GON_E_GONE, "not there (%s)", in->part[part].address), err);
@@ -129,14 +136,18 @@ static int make_axis(struct instrument *in, struct motor *m, struct bus *bus, st
                            &m->axis, err);
 }
 
+int instrument_open_bus(struct instrument *in, int bus, struct gon_error *err)
+{
+    const struct bench_bus *config = &in->bench->buses[bus];
+    return in->bus[bus] ? bus_reopen(in->bus[bus], err)
+                        : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk,
+                                   NULL, &in->bus[bus], err);
+}
+
 static int connect_bus(struct instrument *in, struct motor *m, struct gon_error *err)
 {
-    const struct bench_bus *config = &in->bench->buses[m->bus];
-    struct bus **bus = &in->bus[m->bus];
-    int rc = *bus ? bus_reopen(*bus, err)
-                  : bus_open(config->link, config->timeout_ms, QUIET_MS, &in->breathing.clk, NULL,
-                             bus, err);
-    return rc >= 0 && !m->axis ? make_axis(in, m, *bus, err) : rc;
+    int rc = instrument_open_bus(in, m->bus, err);
+    return rc >= 0 && !m->axis ? make_axis(in, m, in->bus[m->bus], err) : rc;
 }
 
 // Units share their bus: the bus is only reopened when the unit does not answer on it as it is.
@@ -206,9 +217,12 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
     struct gon_error own;
     err = err ? err : &own;
     *err = (struct gon_error){0};
-    int rc = part < INSTRUMENT_AXES ? connect_axis(in, part, err)
-             : part == PART_LASER   ? connect_laser(in, err)
-                                    : connect_detector(in, err);
+    in->talking = (int)part;
+    int rc = part < INSTRUMENT_AXES  ? connect_axis(in, part, err)
+             : part == PART_LASER    ? connect_laser(in, err)
+             : part == PART_DETECTOR ? connect_detector(in, err)
+             : part == PART_MONITOR  ? instrument_connect_monitor(in, err)
+                                     : instrument_connect_device(in, part, err);
     rc = instrument_note(in, part, rc, err);
     if (rc >= 0)
         return 0;
@@ -244,6 +258,8 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
         in->part[part] =
             (struct part_state){.name = "", .link = PART_LOST, .driver = "", .address = ""};
+    in->talking = PART_COUNT;
+    instrument_make_devices(in);
     in->part[PART_LASER].name = "laser";
     in->part[PART_LASER].driver = bench->laser.driver;
     in->part[PART_DETECTOR].name = "detector";
@@ -304,6 +320,11 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
             in->part[i].link = PART_ABSENT;
     }
     in->detector = parts->detector;
+    in->monitor.detector = parts->monitor;
+    for (int i = 0; i < BENCH_DEVICES; i++) {
+        in->companion[i].selector = parts->selector[i];
+        in->companion[i].inputs = parts->inputs[i];
+    }
     if (!(in->safety = safety_new(parts->laser, &in->breathing.clk))) {
         instrument_free(in);
         return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
@@ -343,10 +364,12 @@ bool instrument_free(struct instrument *in)
         }
     for (int i = 0; i < INSTRUMENT_AXES; i++)
         free(in->motor[i].profile); // also of an axis that could not be made
+    instrument_free_devices(in);
     for (int i = 0; i < BENCH_BUSES; i++)
         bus_close(in->bus[i]);
     if (in->detector)
         in->detector->ops->free(in->detector);
+    instrument_free_monitor(in);
     free(in->laser_profile);
     free(in->detector_profile);
     free(in);
@@ -358,61 +381,9 @@ const struct bench_config *instrument_bench(const struct instrument *in)
     return in->bench;
 }
 
-static const struct link_stats *stats_of(const struct instrument *in, enum instrument_part part)
-{
-    if (!is_part_there(in, part))
-        return NULL;
-    if (part == PART_LASER)
-        return safety_stats(in->safety);
-    if (part == PART_DETECTOR)
-        return in->detector->ops->stats ? in->detector->ops->stats(in->detector) : NULL;
-    const struct axis *a = in->motor[part].axis;
-    return a->ops->stats ? a->ops->stats(a) : NULL;
-}
-
 const struct kinematics *instrument_kinematics(const struct instrument *in)
 {
     return &in->kinematics;
-}
-
-void instrument_snapshot(const struct instrument *in, struct instrument_snapshot *ret_snapshot)
-{
-    struct instrument_snapshot *s = ret_snapshot;
-    *s = (struct instrument_snapshot){
-        .t_ns = instrument_now_ns(in),
-        .laser = in->laser,
-        .emission = in->safety && safety_emission(in->safety),
-        .off_unconfirmed = in->safety && safety_pending(in->safety),
-        .range = in->range,
-        .full_scale_v = in->range >= 0 ? instrument_full_scale_v(in, in->range) : (double)NAN,
-        .signal_v = in->sample.signal_v,
-        .monitor_v = in->sample.monitor_v,
-        .time_constant_s = in->time_constant_s,
-    };
-    memcpy(s->part, in->part, sizeof s->part);
-    for (enum instrument_part part = 0; part < PART_COUNT; part++) {
-        const struct link_stats *stats = stats_of(in, part);
-        if (stats)
-            s->part[part].stats = *stats;
-    }
-    for (int i = 0; i < INSTRUMENT_AXES; i++) {
-        const struct motor *m = &in->motor[i];
-        s->axis[i].unit = m->config ? m->config->unit_name : "";
-        s->axis[i].position = m->place.position;
-        s->axis[i].target = m->commanded;
-        s->axis[i].dial = m->place.dial;
-        s->axis[i].raw_steps = m->place.raw_steps;
-        s->axis[i].moving = m->place.moving;
-        s->axis[i].homed = m->place.homed;
-        s->axis[i].alarm = m->place.alarm;
-        s->axis[i].alarm_code = m->place.alarm_code;
-    }
-}
-
-bool instrument_is_dark(const struct instrument_snapshot *s)
-{
-    return s->part[PART_LASER].link == PART_OK && !s->emission && !s->off_unconfirmed &&
-           !s->laser.emission;
 }
 
 // --- an instrument that runs nothing ----------------------------------------------------------
@@ -421,11 +392,15 @@ static void ask(struct instrument *in, enum instrument_part part)
 {
     struct axis_place place;
     struct laser_status laser;
-    struct detector_sample sample;
+    struct gon_error err;
     if (part < INSTRUMENT_AXES)
         instrument_place(in, part, &place, NULL);
+    else if (part >= PART_DEVICES)
+        instrument_ask_device(in, part);
+    else if (part == PART_MONITOR)
+        instrument_sample_monitor(in, &in->sample.monitor_v, &err);
     else if (part == PART_DETECTOR)
-        instrument_sample(in, &sample, NULL);
+        instrument_sample_detector(in, &err);
     else if (instrument_laser(in, &laser, NULL) >= 0 && laser.emission &&
              !safety_emission(in->safety))
         instrument_emission_off(in, NULL);

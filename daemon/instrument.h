@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The bench: axes in user units (degrees, millimetres), laser and detector, opened from a bench
-// configuration and kept open. Each part's link state, last values and errors are remembered for
-// `gonio status`. Thread: instrument; others see copies of struct instrument_snapshot.
+// The bench: axes in user units (degrees, millimetres), laser, detector, monitor and further
+// devices (daemon/instrument_devices.h), opened from a bench configuration and kept open. Each
+// part's link state, last values and errors are remembered for `gonio status`. Thread: instrument;
+// others see copies of struct instrument_snapshot.
 //
 // A part that is not there when the bench is opened, or that goes away, is "lost": calls to it fail
 // with GON_E_GONE or GON_E_LINK and its name in front ("axis theta_r: ..."), and instrument_connect
@@ -24,30 +25,51 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+struct inputs;
 struct instrument;
+struct selector;
 
-// The first parts are the axes, in the order of the bench file: part i is its axes[i].
+// The first parts are the axes, in the order of the bench file: part i is its axes[i]; the last are
+// its devices: PART_DEVICES + i is its devices[i].
 enum instrument_part {
     INSTRUMENT_AXES = BENCH_AXES,
     PART_LASER = INSTRUMENT_AXES,
     PART_DETECTOR,
-    PART_COUNT
+    PART_MONITOR, // a detector of its own
+    PART_DEVICES,
+    PART_COUNT = PART_DEVICES + BENCH_DEVICES
 };
 
 enum part_link { PART_ABSENT, PART_OK, PART_LOST };
 
 struct part_state {
-    const char *name;    // the axis's, "laser", "detector"; "" of an axis the bench has not
-    enum part_link link; // PART_ABSENT: the bench has none
-    const char *driver;  // as the bench file names it; "": absent
-    const char *address; // of its link; "" when made from ready objects
-    char identity[96];   // what it said it is
-    char problem[240];   // why it is lost; "" when it is not
-    uint64_t errors;     // failed calls since the start
-    uint64_t returns;    // times it came back
+    const char *name;     // the axis's, the device's, "laser", "detector", "monitor"; "": absent
+    enum part_link link;  // PART_ABSENT: the bench has none
+    const char *driver;   // as the bench file names it; "": absent
+    const char *address;  // of its link; "" when made from ready objects
+    char identity[96];    // what it said it is
+    char problem[240];    // why it is lost; "" when it is not
+    uint64_t errors;      // failed calls since the start
+    uint64_t returns;     // times it came back
     char last_error[240]; // "" when there was none since the start
     int64_t last_error_ns;
     struct link_stats stats; // of its link, which others may share; zero without one
+};
+
+enum { INSTRUMENT_VALUES = 16, INSTRUMENT_WORD = 32 };
+
+struct instrument_value {
+    char name[INSTRUMENT_WORD], unit[12];
+    double number; // NAN: not known
+};
+
+// A selector or inputs.
+struct device_state {
+    enum bench_use use;
+    char position[INSTRUMENT_WORD]; // where it was seen last; "": at none, not known, or inputs
+    const char *wanted;             // where it stands while measuring; "": inputs
+    struct instrument_value value[INSTRUMENT_VALUES]; // of inputs, as of the last look
+    int values;
 };
 
 // Everything that is known of the bench, as of the last time each part was asked.
@@ -68,7 +90,11 @@ struct instrument_snapshot {
     int range;                 // of the detector; -1: not known
     double full_scale_v;
     double signal_v, monitor_v; // last sample; NAN: none
-    double time_constant_s;     // as the device has it
+    int monitor_range;          // of a monitor of its own; -1: not known
+    char monitor_unit[12];
+    double monitor_full_scale; // in its unit; NAN: not known
+    struct device_state device[BENCH_DEVICES];
+    double time_constant_s; // as the device has it
 };
 
 // Objects that exist already, for tests and simulations; taken over, each may be NULL but not laser
@@ -76,7 +102,9 @@ struct instrument_snapshot {
 struct instrument_parts {
     struct axis *axis[INSTRUMENT_AXES];
     struct laser *laser;
-    struct detector *detector;
+    struct detector *detector, *monitor;
+    struct selector *selector[BENCH_DEVICES];
+    struct inputs *inputs[BENCH_DEVICES];
 };
 
 // Opens what is there; what is not is lost, which is no error. GON_E_INPUT: a link's text is wrong;
@@ -112,7 +140,8 @@ int instrument_tend(struct instrument *in);
 int instrument_reconnect(struct instrument *in);
 
 // A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off,
-// an axis stopped, a detector set up as configured. 0 when it is there.
+// an axis stopped, a detector set up as configured; a selector stays where it is. 0 when it is
+// there.
 enum instrument_part instrument_lost(const struct instrument *in);
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_has(const struct instrument *in, enum instrument_part part);
@@ -168,6 +197,7 @@ int instrument_range(const struct instrument *in); // -1: not known
 // The configured time constant and slope, written and read back; the range is not known afterwards.
 int instrument_set_up(struct instrument *in, struct gon_error *err);
 int instrument_set_range(struct instrument *in, int range, struct gon_error *err);
+// With a monitor of its own, that one is read directly after the detector: monitor_v is its value.
 int instrument_sample(struct instrument *in, struct detector_sample *ret_sample,
                       struct gon_error *err);
 int instrument_clear(struct instrument *in, struct gon_error *err); // as detector.h

@@ -257,15 +257,22 @@ int instrument_set_range(struct instrument *in, int range, struct gon_error *err
     return rc;
 }
 
+int instrument_sample_detector(struct instrument *in, struct gon_error *err)
+{
+    int rc = instrument_need(in, PART_DETECTOR, err);
+    return rc < 0 ? rc
+                  : instrument_note(in, PART_DETECTOR,
+                                    in->detector->ops->sample(in->detector, &in->sample, err), err);
+}
+
 int instrument_sample(struct instrument *in, struct detector_sample *ret_sample,
                       struct gon_error *err)
 {
     struct gon_error own;
     err = err ? err : &own;
-    int rc = instrument_need(in, PART_DETECTOR, err);
-    if (rc >= 0)
-        rc = instrument_note(in, PART_DETECTOR,
-                             in->detector->ops->sample(in->detector, &in->sample, err), err);
+    int rc = instrument_sample_detector(in, err);
+    if (rc >= 0 && instrument_has(in, PART_MONITOR))
+        rc = instrument_sample_monitor(in, &in->sample.monitor_v, err);
     if (rc >= 0)
         *ret_sample = in->sample;
     return rc;
@@ -276,9 +283,9 @@ int instrument_clear(struct instrument *in, struct gon_error *err)
     struct gon_error own;
     err = err ? err : &own;
     int rc = instrument_need(in, PART_DETECTOR, err);
-    return rc < 0 ? rc
-                  : instrument_note(in, PART_DETECTOR, in->detector->ops->clear(in->detector, err),
-                                    err);
+    if (rc >= 0)
+        rc = instrument_note(in, PART_DETECTOR, in->detector->ops->clear(in->detector, err), err);
+    return rc < 0 || !instrument_has(in, PART_MONITOR) ? rc : instrument_clear_monitor(in, err);
 }
 
 int instrument_condition(struct instrument *in, unsigned *ret_flags, struct gon_error *err)

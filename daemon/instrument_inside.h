@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What instrument.c (links, waiting, status) and instrument_calls.c (what each device does) share;
-// nobody else includes it.
+// What instrument.c (links, waiting, status), instrument_calls.c (what axes, laser and detector
+// do), instrument_snapshot.c, instrument_monitor.c and instrument_devices.c share; nobody else
+// includes it.
 #pragma once
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
@@ -27,6 +28,25 @@ struct motor {
     bool engaged;
 };
 
+// A detector of its own.
+struct monitor {
+    struct profile *profile;
+    struct detector *detector;
+    int range; // set last; -1: none yet
+    double time_constant_s;
+};
+
+// A selector or inputs: one of both, NULL before it was opened first.
+struct companion {
+    const struct bench_device *config; // NULL: the bench has none
+    struct profile *profile;
+    struct selector *selector;
+    struct inputs *inputs;
+    int bus;         // index; -1: it has a link of its own
+    int position;    // seen last; SELECTOR_ELSEWHERE
+    int64_t read_ns; // the last look at inputs, also one that failed; INT64_MIN: never
+};
+
 struct instrument {
     const struct bench_config *bench;
     struct kinematics kinematics;
@@ -47,6 +67,10 @@ struct instrument {
     int range;
     double time_constant_s;
     struct detector_sample sample;
+    struct monitor monitor;
+    struct companion companion[BENCH_DEVICES];
+    int talking; // the part that is being talked to, whose link nobody else may use; PART_COUNT:
+                 // none
 };
 
 // Keeps the part's book: what came of a call to it. Puts its name before the error's text. Returns
@@ -55,4 +79,27 @@ int instrument_note(struct instrument *in, enum instrument_part part, int rc,
                     struct gon_error *err);
 // 0 when the part's object exists, so that it can be asked at all.
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err);
-int instrument_write_set_up(struct instrument *in, struct gon_error *err); // of the detector
+bool instrument_is_there(const struct instrument *in, enum instrument_part part); // can be asked
+int instrument_write_set_up(struct instrument *in, struct gon_error *err);        // of the detector
+int instrument_sample_detector(struct instrument *in, struct gon_error *err);     // and no more
+int instrument_open_bus(struct instrument *in, int bus, struct gon_error *err);   // or reopens it
+
+// --- instrument_monitor.c ---
+int instrument_connect_monitor(struct instrument *in, struct gon_error *err);
+int instrument_sample_monitor(struct instrument *in, double *ret_value, struct gon_error *err);
+int instrument_clear_monitor(struct instrument *in, struct gon_error *err);
+void instrument_show_monitor(const struct instrument *in, struct instrument_snapshot *s);
+void instrument_free_monitor(struct instrument *in);
+
+// --- instrument_devices.c ---
+void instrument_make_devices(struct instrument *in); // their parts' books, nothing is opened
+int instrument_connect_device(struct instrument *in, enum instrument_part part,
+                              struct gon_error *err);
+void instrument_ask_device(struct instrument *in, enum instrument_part part); // how it is
+bool instrument_device_there(const struct instrument *in, enum instrument_part part);
+const struct link_stats *instrument_device_stats(const struct instrument *in,
+                                                 enum instrument_part part);
+void instrument_show_devices(const struct instrument *in, struct instrument_snapshot *s);
+void instrument_free_devices(struct instrument *in);
+// The relays of inputs are kept on, those whose link is not in use.
+void instrument_keep_relays(struct instrument *in);

@@ -31,11 +31,6 @@ json_t *inventory_traffic(const struct link_stats *stats)
                      (json_int_t)stats->reopened, "errors", errors, "latency_s", latencies(stats));
 }
 
-static const char *kind_of(int part)
-{
-    return part < INSTRUMENT_AXES ? "axis" : part == PART_LASER ? "laser" : "detector";
-}
-
 static void add_last_error(json_t *o, const struct part_state *p, int64_t now_ns)
 {
     const bool any = *p->last_error;
@@ -50,13 +45,13 @@ static json_t *one(const struct instrument_snapshot *s, int part)
     char serial[64];
     identity_serial(p->identity, serial, sizeof serial);
     json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name,
-                          "kind", kind_of(part), "driver", p->driver, "link", p->address, "state",
-                          p->link == PART_OK ? "ok" : "lost", "why", p->problem, "identity",
-                          p->identity, "serial", serial, "errors", (json_int_t)p->errors, "returns",
-                          (json_int_t)p->returns);
+                          "kind", view_kind(s, part), "driver", p->driver, "link", p->address,
+                          "state", p->link == PART_OK ? "ok" : "lost", "why", p->problem,
+                          "identity", p->identity, "serial", serial, "errors",
+                          (json_int_t)p->errors, "returns", (json_int_t)p->returns);
     add_last_error(o, p, s->t_ns);
     json_object_set_new(o, "traffic", inventory_traffic(&p->stats));
-    json_object_set_new(o, kind_of(part), view_part(s, part));
+    json_object_set_new(o, view_kind(s, part), view_part(s, part));
     return o;
 }
 

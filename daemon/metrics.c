@@ -149,6 +149,22 @@ static void put_devices(FILE *out, const struct instrument_snapshot *s)
         put_family(out, &families[i], s);
 }
 
+static void put_selectors(FILE *out, const struct instrument_snapshot *s)
+{
+    head(out, "gonio_selector_position", "gauge",
+         "1, the position as its label; \"\" at none of its positions.");
+    for (int i = 0; i < BENCH_DEVICES; i++)
+        if (is_there(s, PART_DEVICES + i) && s->device[i].use != BENCH_INPUTS)
+            put(out, "gonio_selector_position", 1, "device", s->part[PART_DEVICES + i].name,
+                "position", s->device[i].position, NULL);
+    head(out, "gonio_input_value", "gauge", "As of the last look; none while it is not known.");
+    for (int i = 0; i < BENCH_DEVICES; i++)
+        for (int k = 0; k < s->device[i].values; k++)
+            put(out, "gonio_input_value", s->device[i].value[k].number, "device",
+                s->part[PART_DEVICES + i].name, "value", s->device[i].value[k].name, "unit",
+                s->device[i].value[k].unit, NULL);
+}
+
 static void put_light(FILE *out, const struct instrument_snapshot *s)
 {
     gauge(out, "gonio_laser_emission", !instrument_is_dark(s),
@@ -262,6 +278,7 @@ char *metrics_text(const struct metrics_source *m)
     put_run(out, m->run);
     if (m->snapshot) {
         put_devices(out, m->snapshot);
+        put_selectors(out, m->snapshot);
         put_light(out, m->snapshot);
         put_links(out, m->snapshot);
     }

@@ -240,6 +240,7 @@ static void halt(struct runner *r)
 static void idle(struct runner *r)
 {
     int64_t tend_ns = 0;
+    const int most_ms = r->links.bench->devices_count ? SLICE_MS : IDLE_MS; // relays to be kept
     while (!r->quit) {
         int64_t now_ns = clk_now_ns(clk_system());
         if (r->start) {
@@ -253,9 +254,11 @@ static void idle(struct runner *r)
             r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
             tend_ns = now_ns + CLK_MS(IDLE_MS);
         } else {
-            struct note *n = note_wait(r->links.box, (int)((tend_ns - now_ns) / 1000000) + 1);
+            const int left_ms = (int)((tend_ns - now_ns) / 1000000) + 1;
+            struct note *n = note_wait(r->links.box, left_ms < most_ms ? left_ms : most_ms);
             if (n)
                 take(r, n);
+            instrument_breathe(r->in);
         }
     }
 }

@@ -243,7 +243,8 @@ static int same_bench(const struct bench_config *then, const struct bench_config
             "the campaign was begun with polarisation %s, the bench has %s; go on with that bench",
             polarisation_name((enum polarisation)then->laser.polarisation),
             polarisation_name((enum polarisation)now->laser.polarisation));
-    return rc < 0 ? rc : bench_same_states(&then->polarisation, &now->polarisation, err);
+    rc = rc < 0 ? rc : bench_same_states(&then->polarisation, &now->polarisation, err);
+    return rc < 0 ? rc : bench_same_devices(then, now, err);
 }
 
 static int read_opening(struct store *store, struct run_material *m, struct gon_error *err)

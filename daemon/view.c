@@ -16,12 +16,11 @@ json_t *view_number(double value)
 
 json_t *view_run(const struct run *run, bool with_fit)
 {
-    json_t *o =
-        json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id, "name",
-                  run->name, "sample", run->sample, "file", run->path, "state",
-                  run_state_name(run->state), "text", run->text, "sweep", run->sweep, "sweeps",
-                  run->sweeps, "done", run->done, "total", run->total, "emission",
-                  run->light == SAFETY_LIGHT_MAYBE);
+    json_t *o = json_pack("{s:i, s:s, s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:b}", "run", run->id,
+                          "name", run->name, "sample", run->sample, "file", run->path, "state",
+                          run_state_name(run->state), "text", run->text, "sweep", run->sweep,
+                          "sweeps", run->sweeps, "done", run->done, "total", run->total, "emission",
+                          run->light == SAFETY_LIGHT_MAYBE);
     json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
     json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
     json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));
@@ -117,6 +116,41 @@ static void add_detector(json_t *o, const struct instrument_snapshot *s)
     json_object_set_new(o, "time_constant_s", view_number(s->time_constant_s));
 }
 
+static void add_monitor(json_t *o, const struct instrument_snapshot *s)
+{
+    json_object_set_new(o, "range", json_integer(s->monitor_range));
+    json_object_set_new(o, "unit", json_string(s->monitor_unit));
+    json_object_set_new(o, "full_scale", view_number(s->monitor_full_scale));
+    json_object_set_new(o, "value", view_number(s->monitor_v));
+}
+
+static void add_device(json_t *o, const struct device_state *d)
+{
+    json_t *values = json_array();
+    if (d->use != BENCH_INPUTS) {
+        json_object_set_new(o, "position", *d->position ? json_string(d->position) : json_null());
+        json_object_set_new(o, "measures_at", json_string(d->wanted));
+    }
+    for (int i = 0; i < d->values; i++) {
+        json_t *v = json_pack("{s:s, s:s}", "name", d->value[i].name, "unit", d->value[i].unit);
+        json_object_set_new(v, "value", view_number(d->value[i].number));
+        json_array_append_new(values, v);
+    }
+    if (d->use == BENCH_INPUTS)
+        json_object_set_new(o, "values", values);
+    else
+        json_decref(values);
+}
+
+const char *view_kind(const struct instrument_snapshot *s, int part)
+{
+    return part < INSTRUMENT_AXES  ? "axis"
+           : part == PART_LASER    ? "laser"
+           : part == PART_DETECTOR ? "detector"
+           : part == PART_MONITOR  ? "monitor"
+                                   : bench_uses[s->device[part - PART_DEVICES].use];
+}
+
 json_t *view_part(const struct instrument_snapshot *s, int part)
 {
     json_t *o = json_object();
@@ -124,8 +158,12 @@ json_t *view_part(const struct instrument_snapshot *s, int part)
         add_axis(o, s, part);
     else if (part == PART_LASER)
         add_laser(o, s);
-    else
+    else if (part == PART_DETECTOR)
         add_detector(o, s);
+    else if (part == PART_MONITOR)
+        add_monitor(o, s);
+    else
+        add_device(o, &s->device[part - PART_DEVICES]);
     return o;
 }
 
@@ -136,10 +174,10 @@ json_t *view_devices(const struct instrument_snapshot *s)
         const struct part_state *p = &s->part[i];
         if (p->link == PART_ABSENT)
             continue;
-        json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name, "link",
-                              p->link == PART_OK ? "ok" : "lost", "address", p->address, "identity",
-                              p->identity, "problem", p->problem, "errors", (json_int_t)p->errors,
-                              "returns", (json_int_t)p->returns);
+        json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:I, s:I}", "name", p->name, "kind",
+                              view_kind(s, i), "link", p->link == PART_OK ? "ok" : "lost",
+                              "address", p->address, "identity", p->identity, "problem", p->problem,
+                              "errors", (json_int_t)p->errors, "returns", (json_int_t)p->returns);
         json_object_update_new(o, view_part(s, i));
         json_array_append_new(all, o);
     }

@@ -23,9 +23,13 @@ json_t *view_queue(const struct queue *q);
 // {"name", "reason", "since_utc_ms"}; null: nobody has control
 json_t *view_control(const struct control *c);
 
-// [{"name", "link", "address", "identity", "problem", "errors", "returns", then what belongs to
-// it}]; of an axis "unit", "position", "target" (user), "dial", "raw_steps", "moving", "homed",
-// "alarm", "alarm_code"
+// "axis", "laser", "detector", "monitor"; of a device its use: "shutter", "inputs", ...
+const char *view_kind(const struct instrument_snapshot *s, int part);
+// [{"name", "kind", "link", "address", "identity", "problem", "errors", "returns", then what
+// belongs to it}]; of an axis "unit", "position", "target" (user), "dial", "raw_steps", "moving",
+// "homed", "alarm", "alarm_code"; of a monitor "range", "unit", "full_scale", "value"; of a
+// selector "position" (null: at none) and "measures_at"; of inputs "values": [{"name", "unit",
+// "value"}]
 json_t *view_devices(const struct instrument_snapshot *s);
 json_t *view_part(const struct instrument_snapshot *s, int part); // what belongs to it alone
 

@@ -15,8 +15,10 @@
 struct axis;
 struct bus;
 struct detector;
+struct inputs;
 struct laser;
 struct profile;
+struct selector;
 
 int device_open_laser(const char *driver, const char *folder, struct profile **profile,
                       const char *link, struct clk *clk, const struct cancel *cancel,
@@ -24,6 +26,15 @@ int device_open_laser(const char *driver, const char *folder, struct profile **p
 int device_open_detector(const char *driver, const char *folder, struct profile **profile,
                          const char *link, struct clk *clk, const struct cancel *cancel,
                          struct detector **ret_detector, struct gon_error *err);
+int device_open_selector(const char *driver, const char *folder, struct profile **profile,
+                         const char *link, struct clk *clk, const struct cancel *cancel,
+                         struct selector **ret_selector, struct gon_error *err);
+int device_open_inputs(const char *driver, const char *folder, struct profile **profile,
+                       const char *link, struct clk *clk, const struct cancel *cancel,
+                       struct inputs **ret_inputs, struct gon_error *err);
 // The bus is borrowed.
 int device_new_axis(const char *driver, const char *folder, struct profile **profile,
                     struct bus *bus, int unit, struct axis **ret_axis, struct gon_error *err);
+int device_new_inputs(const char *driver, const char *folder, struct profile **profile,
+                      struct bus *bus, int unit, struct clk *clk, struct inputs **ret_inputs,
+                      struct gon_error *err);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/inputs.h"
 
+#include "drivers/message.h"
 #include "drivers/session.h"
 
 #include <assert.h>
@@ -131,6 +132,12 @@ bool inputs_find(const struct inputs *in, const char *name, struct inputs_value 
             return true;
         }
     return false;
+}
+
+const struct link_stats *inputs_stats(const struct inputs *in)
+{
+    const struct message *m = session_message(in->s);
+    return m ? message_stats(m) : NULL;
 }
 
 bool inputs_hold(const struct inputs *in, const char *condition)

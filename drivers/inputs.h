@@ -18,6 +18,7 @@
 
 struct bus;
 struct inputs;
+struct link_stats;
 struct profile;
 
 struct inputs_value {
@@ -45,6 +46,8 @@ int inputs_count(const struct inputs *in);
 struct inputs_value inputs_at(const struct inputs *in,
                               int index); // 0..count-1, the profile's order
 bool inputs_find(const struct inputs *in, const char *name, struct inputs_value *ret_value);
+// Of its own link; NULL on a bus, whose book its owner has.
+const struct link_stats *inputs_stats(const struct inputs *in);
 // A condition over them (profile_when.h): false while a value in it is not known.
 bool inputs_hold(const struct inputs *in, const char *condition);
 

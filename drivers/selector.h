@@ -11,6 +11,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+struct link_stats;
 struct selector;
 
 enum { SELECTOR_ELSEWHERE = -1 }; // at none of its positions
@@ -27,6 +28,7 @@ struct selector_ops {
     // answer). GON_E_DEVICE: it does not go there; GON_E_LINK: nobody knows where it is.
     int (*go)(struct selector *z, int position, struct gon_error *err);
     int (*reopen)(struct selector *z, struct gon_error *err);
+    const struct link_stats *(*stats)(const struct selector *z); // NULL: it has no link
     void (*free)(struct selector *z);
 };
 

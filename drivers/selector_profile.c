@@ -160,6 +160,11 @@ static int reopen(struct selector *z, struct gon_error *err)
     return session_reopen(selector_of(z)->s, err);
 }
 
+static const struct link_stats *stats(const struct selector *z)
+{
+    return message_stats(session_message(((const struct profiled_selector *)z)->s));
+}
+
 static void selector_free(struct selector *z)
 {
     if (!z)
@@ -185,7 +190,7 @@ int selector_by_profile(const struct profile *p, const char *link, struct clk *c
                         struct gon_error *err)
 {
     static const struct selector_ops ops = {
-        identify, positions, name, safe, where, go, reopen, selector_free,
+        identify, positions, name, safe, where, go, reopen, stats, selector_free,
     };
     struct session *s;
     int rc = check_profile(p, err);

@@ -60,6 +60,7 @@ void world_init(struct world *w, const struct world_spec *spec, int64_t t_ns)
     memset(w, 0, sizeof *w);
     w->spec = *spec;
     w->t_ns = t_ns;
+    w->lets_out = w->lets_in = 1;
     for (int i = 0; i < WORLD_AXES; i++) {
         const struct world_axis_spec *a = &spec->axis[i];
         motion_init(&w->axis[i], a->min, a->max, a->backlash, a->start);
@@ -106,7 +107,8 @@ static double detected_per_w(struct world *w, int64_t t_ns)
 double world_input_v(struct world *w, int64_t t_ns)
 {
     double power_w = sim_laser_power_w(&w->laser);
-    double detected_w = power_w > 0 ? power_w * detected_per_w(w, t_ns) : 0;
+    double detected_w =
+        power_w > 0 ? power_w * w->lets_out * w->lets_in * detected_per_w(w, t_ns) : 0;
     double v = w->spec.responsivity_v_per_w * detected_w + w->spec.offset_v;
     return w->saturate ? v + 10 : v;
 }
@@ -142,7 +144,8 @@ double world_aux_v(struct world *w, int input)
 {
     double v = w->spec.monitor_noise_v * noise_normal(&w->monitor_noise);
     if (input == 1)
-        v += w->spec.monitor_dark_v + w->spec.monitor_v_per_w * sim_laser_power_w(&w->laser);
+        v += w->spec.monitor_dark_v +
+             w->spec.monitor_v_per_w * w->lets_out * sim_laser_power_w(&w->laser);
     v = fmin(fmax(v, -10.5), 10.5);
     return rint(v * 3000) / 3000;
 }

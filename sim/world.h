@@ -58,7 +58,9 @@ struct world {
         unsigned off;
         double per_w; // NAN: not known
     } view;
-    bool saturate; // fault injection: the input sees far too much
+    double lets_out; // part of its light that leaves the source: a shutter; 1
+    double lets_in;  // part of the light that reaches the detector, not the monitor: filters; 1
+    bool saturate;   // fault injection: the input sees far too much
 };
 
 // "theta_i", "theta_r", "sample", "polariser", "analyser"

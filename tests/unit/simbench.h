@@ -21,7 +21,16 @@
 #define PART_THETA_R ((enum instrument_part)WORLD_THETA_R)
 #define PART_SAMPLE ((enum instrument_part)WORLD_SAMPLE)
 
-enum simbench_device { SIMBENCH_AXES, SIMBENCH_LASER, SIMBENCH_DETECTOR, SIMBENCH_DEVICES };
+enum simbench_device {
+    SIMBENCH_AXES,
+    SIMBENCH_LASER,
+    SIMBENCH_DETECTOR,
+    SIMBENCH_DEVICES,
+    SIMBENCH_MONITOR = SIMBENCH_DEVICES, // these of tests/unit/simdevices.h
+    SIMBENCH_SHUTTER,
+    SIMBENCH_WHEEL,
+    SIMBENCH_ALL
+};
 
 struct simbench;
 
@@ -52,7 +61,7 @@ struct simbench {
     // faults: the fail_at-th call from now on fails; or one call of a device
     long calls, fail_at;
     int fail_code;
-    int64_t gone_until_ns[SIMBENCH_DEVICES]; // unplugged
+    int64_t gone_until_ns[SIMBENCH_ALL]; // unplugged
     int64_t gone_for_ns;
     enum simbench_device failed; // who was hit
     bool hit_done;

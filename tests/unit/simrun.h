@@ -11,11 +11,13 @@
 #include "campaign/store.h"
 #include "tests/unit/simbench.h"
 #include "tests/unit/simconfig.h"
+#include "tests/unit/simdevices.h"
 
 enum { ROWS_MOST = 4000, TEXTS_MOST = 400 };
 
 struct run {
     struct simbench b;
+    struct simdevices devices; // those that the bench names
     struct bench_config bench;
     struct instrument *in;
     struct campaign_config config;
@@ -58,6 +60,12 @@ static inline bool emits(struct run *r)
 {
     world_see(&r->b.world, r->b.clk.t_ns);
     return sim_laser_emits(&r->b.world.laser);
+}
+
+// Light that a shutter lets out.
+static inline bool is_lit(struct run *r)
+{
+    return emits(r) && r->b.world.lets_out > 0;
 }
 
 // A laser that was unplugged can be told again once it is back and its reopening, 2 s apart, was
@@ -106,9 +114,9 @@ static inline void keep(struct run *r, const struct store_reading *row)
     if (r->rows > 0 && is_accepted(&r->row[r->rows - 1]) &&
         p == point_of(r, r->row[r->rows - 1].sweep, r->row[r->rows - 1].point))
         violate(r, "a point was measured again after it was accepted");
-    if (p->kind == PLAN_DARK && emits(r))
-        violate(r, "a dark with the laser on");
-    if (p->kind != PLAN_DARK && is_accepted(row) && r->state != RUN_PAUSED && !emits(r))
+    if (p->kind == PLAN_DARK && is_lit(r))
+        violate(r, "a dark with light");
+    if (p->kind != PLAN_DARK && is_accepted(row) && r->state != RUN_PAUSED && !is_lit(r))
         violate(r, "light was expected");
     if (!isfinite(row->signal_v))
         violate(r, "not a number was stored");
@@ -283,6 +291,10 @@ static inline struct run *begin_on(const struct world_spec *spec, const struct b
                                      .take_resume = port_resume,
                                      .take_pause = port_pause};
     struct instrument_parts parts = simbench_parts(&r->b);
+    if (*bench->monitor.driver || bench->devices_count) {
+        simdevices_init(&r->devices, &r->b);
+        simdevices_parts(&r->devices, &r->bench, &parts);
+    }
     assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
     return r;
 }

@@ -141,10 +141,10 @@ static void axes_mistakes_name_their_lines(void **state)
     static const char twelve[] = AXIS("theta_i", "1", "") ",\n" AXIS("theta_r", "2", "") ",\n" AXIS(
         "laser", "3", "") ",\n" AXIS("Phi 2", "4", "") ",\n" AXIS("sample", "5", "");
     wrong(bench(twelve, "", BEAM),
-          "b.cfg:11: axes[2].name = \"laser\": allowed a-z, 0-9, _ and -, and neither laser nor "
-          "detector\n"
-          "b.cfg:14: axes[3].name = \"Phi 2\": allowed a-z, 0-9, _ and -, and neither laser nor "
-          "detector\n"
+          "b.cfg:11: axes[2].name = \"laser\": allowed a-z, 0-9, _ and -, and not laser, "
+          "detector or monitor\n"
+          "b.cfg:14: axes[3].name = \"Phi 2\": allowed a-z, 0-9, _ and -, and not laser, "
+          "detector or monitor\n"
           "b.cfg:17: axes[4].unit_name: sample is in mm\n");
 }
 

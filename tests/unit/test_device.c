@@ -55,7 +55,28 @@ static void one_of_another_role_or_name_is_an_error_of_the_bench_file(void **sta
     inputs->role = PROFILE_INPUTS;
     inputs->protocol = PROFILE_MODBUS;
     assert_int_equal(device_new_axis("door", "configs", &inputs, NULL, 1, &a, &err), GON_E_INPUT);
+    struct inputs *in;
+    assert_int_equal(device_open_inputs("door", "configs", &inputs, "serial:/dev/not-there",
+                                        clk_system(), NULL, &in, &err),
+                     GON_E_INPUT);
+    assert_non_null(strstr(err.text, "'door' is not one of inputs on a link of its own"));
+    inputs->role = PROFILE_SELECTOR;
+    assert_int_equal(
+        device_new_inputs("door", "configs", &inputs, NULL, 1, clk_system(), &in, &err),
+        GON_E_INPUT);
+    assert_non_null(strstr(err.text, "'door' is not one of inputs on a Modbus bus"));
     free(inputs);
+    struct selector *z;
+    p = NULL;
+    assert_int_equal(device_open_selector("thorlabs-sc10", "configs", &p, "serial:/dev/not-there",
+                                          clk_system(), NULL, &z, &err),
+                     GON_E_GONE);
+    free(p);
+    p = NULL;
+    assert_int_equal(device_open_selector("sr830", "configs", &p, "serial:/dev/not-there",
+                                          clk_system(), NULL, &z, &err),
+                     GON_E_INPUT);
+    free(p);
 }
 
 int main(void)

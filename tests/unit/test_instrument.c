@@ -35,7 +35,8 @@ static void make(struct setting *s)
 // Of a bench with the world's three axes.
 static enum part_link expected(int part, enum part_link of_all)
 {
-    return part <= WORLD_SAMPLE || part >= INSTRUMENT_AXES ? of_all : PART_ABSENT;
+    return part <= WORLD_SAMPLE || part == PART_LASER || part == PART_DETECTOR ? of_all
+                                                                               : PART_ABSENT;
 }
 
 static void end(struct setting *s)

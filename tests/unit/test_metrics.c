@@ -32,13 +32,21 @@ static void part(struct instrument_snapshot *s, int i, const char *name, const c
 static struct instrument_snapshot bench(void)
 {
     struct instrument_snapshot s = {.signal_v = 0.25, .monitor_v = (double)NAN};
-    for (int i = 0; i < INSTRUMENT_AXES; i++)
+    for (int i = 0; i < PART_COUNT; i++)
         part(&s, i, "", "", PART_ABSENT);
     part(&s, PART_THETA_I, "theta_i", BUS, PART_LOST);
     part(&s, PART_THETA_R, "theta_r", BUS, PART_OK);
     part(&s, PART_SAMPLE, "sample", "", PART_ABSENT);
     part(&s, PART_LASER, "laser", "serial:/dev/l", PART_OK);
     part(&s, PART_DETECTOR, "detector", "tcp:d:1", PART_LOST);
+    part(&s, PART_DEVICES, "nd", "serial:/dev/w", PART_OK);
+    part(&s, PART_DEVICES + 1, "door", BUS, PART_OK);
+    snprintf(s.device[0].position, sizeof s.device[0].position, "2");
+    s.device[0].use = BENCH_FILTER;
+    s.device[1] =
+        (struct device_state){.use = BENCH_INPUTS,
+                              .values = 2,
+                              .value = {{"open", "", 1}, {"bench_c", "degC", (double)NAN}}};
     s.axis[PART_THETA_I].position = (double)NAN;
     s.axis[PART_THETA_R].position = -12.5;
     s.laser.power_w = (double)NAN;
@@ -74,6 +82,9 @@ static void values_are_lines_and_unknown_ones_are_left_out(void **state)
     assert_has(text, "gonio_axis_position{axis=\"theta_r\",unit=\"deg\"} -12.5");
     assert_has(text, "gonio_device_up{device=\"theta_i\",driver=\"driver\",link=\"" BUS "\"} 0");
     assert_has(text, "gonio_detector_signal_volts 0.25");
+    assert_has(text, "gonio_selector_position{device=\"nd\",position=\"2\"} 1");
+    assert_has(text, "gonio_input_value{device=\"door\",value=\"open\",unit=\"\"} 1");
+    assert_null(strstr(text, "bench_c"));
     assert_has(text, "gonio_laser_interlock_closed 1");
     assert_null(strstr(text, "nan"));
     assert_null(strstr(text, "axis=\"theta_i\",unit"));
@@ -131,8 +142,8 @@ static void a_link_that_parts_share_is_told_once(void **state)
     assert_has(text, "gonio_link_up{link=\"tcp:d:1\"} 0");
     assert_has(text, "gonio_link_requests_total{link=\"" BUS "\"} 42");
     assert_has(text, "gonio_link_errors_total{link=\"" BUS "\",kind=\"silent\"} 4");
-    assert_int_equal(count(text, "\ngonio_link_requests_total{"), 3);
-    assert_int_equal(count(text, "\ngonio_link_errors_total{"), 3 * LINK_ERRORS);
+    assert_int_equal(count(text, "\ngonio_link_requests_total{"), 4);
+    assert_int_equal(count(text, "\ngonio_link_errors_total{"), 4 * LINK_ERRORS);
     free(text);
 }
 

@@ -177,6 +177,28 @@ static void only_accepted_readings_are_reduced(void **state)
     plan_clear(&s.plan);
 }
 
+// A filter that passes 1 % of the beam, with u 0.5 % of that.
+static void a_filter_that_stands_in_the_beam_alone_divides_the_beam(void **state)
+{
+    (void)state;
+    static struct setup s;
+    struct reduction r;
+    start(&s, ONE_SWEEP);
+    struct bench_station *beam = &s.bench.stations[0];
+    assert_string_equal(beam->name, "beam");
+    beam->places[beam->places_count++] =
+        (struct bench_place){"nd", "2", .transmission = 0.01, .u_transmission = 0.00005};
+    add(&s, 0, 0, 0, 0);
+    add(&s, 0, 1, 1, 1);
+    add(&s, 1, 0, 0.5, 1);
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(near(r.points[0].f_per_sr, 0.005 / r.omega_sr, 1e-9));
+    assert_true(near(r.channel[0].u_filter_rel, 0.005, 1e-9));
+    assert_true(near(r.u_scale_rel, hypot(0.005, hypot(r.u_radius_rel, r.u_distance_rel)), 1e-9));
+    reduction_clear(&r);
+    plan_clear(&s.plan);
+}
+
 #define POLARISED(states)                                                                          \
     "campaign: { name = \"a\"; theta_i_deg = 30; theta_r: { from_deg = 0; to_deg = 60; step_deg "  \
     "= "                                                                                           \
@@ -448,6 +470,7 @@ int main(void)
         cmocka_unit_test(angles_are_the_encoders),
         cmocka_unit_test(references_are_averaged_and_their_scatter_counts),
         cmocka_unit_test(only_accepted_readings_are_reduced),
+        cmocka_unit_test(a_filter_that_stands_in_the_beam_alone_divides_the_beam),
         cmocka_unit_test(each_state_is_divided_by_its_own_beam),
         cmocka_unit_test(readings_behind_the_analyser_go_over_its_transmission),
         cmocka_unit_test(an_operators_analyser_is_not_reckoned_with),

@@ -328,6 +328,13 @@ static void another_bench_is_refused(void **state)
     assert_non_null(strstr(n->err.text, "distance 500 mm then, 400 now"));
     note_free(n);
     w->bench.distance_mm = 500;
+    snprintf(w->bench.monitor.driver, sizeof w->bench.monitor.driver, "thorlabs-pm100");
+    storer_step(w->storer, note_of(NOTE_OPEN, run->id, run->path, NULL));
+    n = expect(w->to_main, NOTE_OPENED);
+    assert_int_equal(n->err.code, GON_E_REFUSED);
+    assert_non_null(strstr(n->err.text, "the bench has a thorlabs-pm100"));
+    note_free(n);
+    w->bench.monitor.driver[0] = 0;
     run_material_free(open_run(w, run)); // and the file was let go of
     close_run(w, run->id, RUN_STOPPED);
     free(run);
