@@ -156,8 +156,8 @@ static void stand(struct actor_world *l, double at)
     tell(l, find(l, the(l)->axis.target), rint(at * l->steps_per_unit));
 }
 
-void actor_world_axis(struct actor_world *l, struct actor *a, struct world *w,
-                      enum world_axis axis, double steps_per_unit)
+void actor_world_axis(struct actor_world *l, struct actor *a, struct world *w, enum world_axis axis,
+                      double steps_per_unit)
 {
     begin(l, a, w, meet_world);
     l->position = find(l, the(l)->axis.position); // it goes by itself: the world follows

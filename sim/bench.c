@@ -12,8 +12,8 @@
 const char *const bench_port_names[BENCH_PORTS] = {"axes",      "axes-tcp", "laser",
                                                    "laser-tcp", "detector", "detector-tcp"};
 
-const char *const bench_part_names[BENCH_PARTS] = {
-    "theta_i", "theta_r", "sample", "polariser", "analyser", "laser", "detector"};
+const char *const bench_part_names[BENCH_PARTS] = {"theta_i",  "theta_r", "sample",  "polariser",
+                                                   "analyser", "laser",   "detector"};
 
 const char *const bench_controllers[] = {"oriental-az", "leadshine-pr", NULL};
 

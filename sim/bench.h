@@ -44,7 +44,7 @@ struct bench_spec {
 enum bench_part { BENCH_THE_LASER = WORLD_AXES, BENCH_THE_DETECTOR, BENCH_PARTS }; // 0..: axes
 extern const char *const bench_part_names[BENCH_PARTS]; // "theta_i", ..., "laser", "detector"
 
-struct bench_actor { // an instrument made from a profile, as a part of the world
+struct bench_actor {               // an instrument made from a profile, as a part of the world
     const struct profile *profile; // NULL: none
     struct actor actor;
     struct actor_world world;
@@ -55,7 +55,7 @@ struct bench {
     struct world world;
     struct bench_actor by_profile[BENCH_PARTS]; // those whose profile is there
     int controller;
-    struct sim_az az[WORLD_AXES]; // units 1, 2, 3; 4 and 5 with elements
+    struct sim_az az[WORLD_AXES];               // units 1, 2, 3; 4 and 5 with elements
     struct sim_leadshine leadshine[WORLD_AXES]; // or these
     struct sim_cobolt laser;
     struct sim_sr830 detector;

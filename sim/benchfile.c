@@ -27,9 +27,8 @@ static void axis(FILE *out, const struct sim_config *c, int unit, const char *na
             "\"%s\"; "
             "steps_per_unit = %s;\n    min = %s; max = %s; speed = %s; acceleration = %s; ",
             name, *c->axes_profile ? c->axes_profile : bench_controllers[c->bench.controller], unit,
-            unit_name,
-            real(t[0], c->steps_per_unit), real(t[1], min), real(t[2], max), real(t[3], c->speed),
-            real(t[4], c->acceleration));
+            unit_name, real(t[0], c->steps_per_unit), real(t[1], min), real(t[2], max),
+            real(t[3], c->speed), real(t[4], c->acceleration));
     fprintf(out, "backlash = %s; deadband = %s; }%s\n", real(t[0], backlash),
             real(t[1], 3 / c->steps_per_unit), end);
 }

@@ -126,8 +126,10 @@ static bool own_laser(struct request *r, const char *key)
 {
     if (!bench_actor(the(r), BENCH_THE_LASER))
         return true;
-    request_refuse(r, "'%s' is of the laser that is built in; this one is made from a profile: set "
-                      "its values (\"part\":\"laser\")", key);
+    request_refuse(r,
+                   "'%s' is of the laser that is built in; this one is made from a profile: set "
+                   "its values (\"part\":\"laser\")",
+                   key);
     return false;
 }
 
