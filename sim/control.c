@@ -38,14 +38,15 @@ static json_t *time_or_null(int64_t t_ns)
 static json_t *laser_state(const struct request *r)
 {
     const struct sim_laser *l = &the(r)->world.laser;
-    return json_pack("{s:b,s:I,s:f,s:f,s:i,s:i,s:b,s:b,s:b,s:o,s:o,s:I,s:I,s:I}", "emission",
-                     sim_laser_emits(l), "since_ns", (json_int_t)l->emission_since_ns, "power_w",
-                     sim_laser_power_w(l), "setpoint_w", l->setpoint_w, "state", l->state, "fault",
-                     l->fault, "key", l->key, "needs_key_cycle", l->needs_key_cycle,
-                     "interlock_closed", l->interlock_closed, "last_off_ns",
-                     time_or_null(l->last_off_ns), "last_on_ns", time_or_null(l->last_on_ns),
-                     "offs", (json_int_t)l->offs, "ons", (json_int_t)l->ons, "too_early",
-                     (json_int_t)the(r)->laser.too_early);
+    const struct bench_actor *actor = bench_actor(the(r), BENCH_THE_LASER);
+    const uint64_t too_early = actor ? actor->actor.too_early : the(r)->laser.too_early;
+    return json_pack(
+        "{s:b,s:I,s:f,s:f,s:i,s:i,s:b,s:b,s:b,s:o,s:o,s:I,s:I,s:I}", "emission", sim_laser_emits(l),
+        "since_ns", (json_int_t)l->emission_since_ns, "power_w", sim_laser_power_w(l), "setpoint_w",
+        l->setpoint_w, "state", l->state, "fault", l->fault, "key", l->key, "needs_key_cycle",
+        l->needs_key_cycle, "interlock_closed", l->interlock_closed, "last_off_ns",
+        time_or_null(l->last_off_ns), "last_on_ns", time_or_null(l->last_on_ns), "offs",
+        (json_int_t)l->offs, "ons", (json_int_t)l->ons, "too_early", (json_int_t)too_early);
 }
 
 static json_t *detector_state(const struct request *r)

@@ -5,8 +5,11 @@ import difflib
 import os
 import pty
 import re
+import select
+import shlex
 import signal
 import subprocess
+import time
 
 import pytest
 
@@ -22,10 +25,13 @@ def on_terminal(command, folder, env):
     master, slave = pty.openpty()
     process = subprocess.Popen(["bash", "-c", command], stdin=slave, stdout=slave, stderr=slave, cwd=folder, env=env)
     os.close(slave)
+    end = time.monotonic() + LONGEST_S
     said = b""
     try:
-        while chunk := os.read(master, 65536):
-            said += chunk
+        while select.select([master], [], [], max(0.0, end - time.monotonic()))[0]:
+            said += os.read(master, 65536)
+        process.kill()
+        said += f"\nnot ended within {LONGEST_S} s\n".encode()
     except OSError:
         pass  # EIO: nobody has the terminal any more
     os.close(master)
@@ -46,7 +52,7 @@ class Terminals:
 
     def start(self, step):
         ((command, expected),) = commands(step)
-        program = Program(["bash", "-c", f"cd {self.folder} && exec {command}"],
+        program = Program(["bash", "-c", f"cd {shlex.quote(str(self.folder))} && exec {command}"],
                           self.folder / f"terminal{len(self.running)}", self.env)
         self.running.append(program)
         try:
