@@ -10,7 +10,8 @@ from conftest import QUICK_LASER, wait_for
 from test_paper_campaign import SMALL_PLAN, recover
 
 STEADY = ("--set", "laser.drift_rms=0")
-FEW = SMALL_PLAN.replace("step_deg = 5.0", "step_deg = 20.0").replace("10.0, 30.0, 55.0", "10.0, 50.0")
+FEW = SMALL_PLAN.replace("step_deg = 5.0", "step_deg = 20.0").replace("10.0, 30.0, 55.0", "10.0, 50.0").replace(
+    "dense:", "readings: { count = 2; };\n  dense:")
 
 BENCHES = [
     ("sr860", "coherent-obis", "", SMALL_PLAN, ()),
