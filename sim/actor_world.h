@@ -32,7 +32,7 @@ struct actor_world {
 void actor_world_detector(struct actor_world *l, struct actor *a, struct world *w,
                           double signal_per_v);
 void actor_world_laser(struct actor_world *l, struct actor *a, struct world *w);
-void actor_world_axis(struct actor_world *l, struct actor *a, struct world *w,
-                      enum world_axis axis, double steps_per_unit);
+void actor_world_axis(struct actor_world *l, struct actor *a, struct world *w, enum world_axis axis,
+                      double steps_per_unit);
 // Off and on again: it begins as its profile says, where things are.
 void actor_world_power_cycle(struct actor_world *l, int64_t t_ns);

@@ -4,9 +4,11 @@ detector.profile, axes.profile) in place of its own models: what is recovered li
 Judged as in test_paper_campaign.py: beyond 3 standard uncertainties the campaign is made once more, by which 4
 campaigns fail by chance once in 3600 runs. Where there is no monitor the laser does not drift, as its drift is then in
 no uncertainty of a reading."""
+import shutil
+
 import pytest
 
-from conftest import QUICK_LASER, wait_for
+from conftest import QUICK_LASER, ROOT, gonio, wait_for
 from test_paper_campaign import SMALL_PLAN, recover
 
 STEADY = ("--set", "laser.drift_rms=0")
@@ -95,6 +97,19 @@ def test_an_axis_begins_where_it_stands_and_keeps_its_place(start_sim):
     assert abs(axis()["motor"] - 10) < 1e-9 and abs(axis()["load"] - 10) < 0.016
     assert sim.control(do="power-cycle", axis="theta_i")["ok"]
     assert axis()["steps"] == 10000 and abs(axis()["motor"] - 10) < 1e-9
+
+
+def test_a_file_is_named_from_the_folder_of_sim_cfg(start_sim, tmp_path):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    shutil.copy(ROOT / "configs" / "profiles" / "keithley-6485.cfg", folder / "meter.cfg")
+    (folder / "sim.cfg").write_text('detector: { profile = "./meter.cfg"; signal_per_v = 1e-3; };\n')
+    sim = start_sim("--config", folder / "sim.cfg", "--fast")
+    bench = (sim.folder / "goniod.cfg").read_text()
+    assert f'driver = "{folder}/meter.cfg"' in bench and "monitor_aux = 0" in bench and "slope_db = 6" in bench
+    assert gonio("check", sim.folder / "goniod.cfg").returncode == 0
+    assert sim.control(do="set", part="detector", values={"full_scale": 2e-9})["ok"]
+    wait_for(lambda: abs(sim.control(do="values", part="detector")["values"]["current_a"] - 2e-10) < 1e-10)
 
 
 @pytest.mark.parametrize("setting, says", [
