@@ -101,20 +101,6 @@ static void print_values(const struct profile *p)
 
 // --- what is said --------------------------------------------------------------------------------
 
-static void print_checksum(const struct profile_checksum *c)
-{
-    static const char *const kinds[] = {"", "CRC", "sum", "exclusive or", "LRC"};
-    static const char *const forms[] = {"in hexadecimal, A to F", "in hexadecimal, a to f",
-                                        "as bytes, the high one first",
-                                        "as bytes, the low one first"};
-    if (c->kind == PROFILE_NO_SUM)
-        return;
-    printf("Behind each of them stands ");
-    code(c->before);
-    printf("%sits %s of %d bits, %s.\n", *c->before ? " and " : "", kinds[c->kind], c->width,
-           forms[c->form]);
-}
-
 static void print_exchanges(const struct profile *p)
 {
     const struct profile_framing *f = &p->framing;
@@ -124,7 +110,6 @@ static void print_exchanges(const struct profile *p)
     printf(", an answer with ");
     code(f->end_in);
     printf(". Commands are %g ms apart; an answer comes within %g ms.\n", f->gap_ms, f->timeout_ms);
-    print_checksum(&p->checksum);
     heading("Exchanges");
     printf("| name | sent | answer | read back by | meaning |\n|---|---|---|---|---|\n");
     for (int i = 0; i < p->exchanges_count; i++) {
