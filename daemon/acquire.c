@@ -152,7 +152,7 @@ static int take_samples(struct instrument *in, const struct acquire *a,
     r->signal_v = signal.mean;
     r->signal_sd_v = sd(&signal);
     r->monitor_v = monitor.mean;
-    r->monitor_sd_v = sd(&monitor);
+    r->monitor_sd_v = isnan(monitor.mean) ? monitor.mean : sd(&monitor);
     return 0;
 }
 

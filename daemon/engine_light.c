@@ -156,8 +156,11 @@ static int light_up(struct engine *e)
     e->light_ns = e->source_ns = clk_now_ns(e->ports->clk);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     e->acquire.range = -1;
-    engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g %s", e->monitor_lit_v,
-               instrument_monitor_unit(e->in));
+    if (isfinite(e->monitor_lit_v))
+        engine_say(e, ENGINE_LOG, "notice", "laser warm, monitor %.4g %s", e->monitor_lit_v,
+                   instrument_monitor_unit(e->in));
+    else
+        engine_say(e, ENGINE_LOG, "notice", "laser warm");
     return 0;
 }
 

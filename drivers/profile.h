@@ -366,9 +366,19 @@ struct profile_deny {
     char then[PROFILE_TEXT];   // an error register's bit
 };
 
+struct profile_follow { // what is always so while something else is: flags of what is measured
+    char when[PROFILE_TEXT], then[PROFILE_TEXT];
+};
+
+// In the simulated bench (sim.cfg) signal, monitor and reference of a detector and the position of
+// an axis are what the world makes them, and the world has the light of a laser: laser.power, or
+// its set-point, while shines holds ("": laser.emitting).
 struct profile_simulate {
     struct profile_start start[PROFILE_VALUES];
     int start_count;
+    struct profile_follow follows[PROFILE_STEPS];
+    int follows_count;
+    char shines[PROFILE_TEXT]; // condition
     struct profile_drift drift[PROFILE_STEPS];
     int drift_count;
     struct profile_deny deny[PROFILE_STEPS];

@@ -110,6 +110,11 @@ void check_simulate(struct checking *c)
         check_value_name(c, check_at("simulate.drift[%d].rate_value", i), d->rate_value);
         check_then(c, check_at("simulate.drift[%d].then", i), d->then);
     }
+    for (int i = 0; i < s->follows_count; i++) {
+        check_condition(c, check_at("simulate.follows[%d].when", i), s->follows[i].when);
+        check_then(c, check_at("simulate.follows[%d].then", i), s->follows[i].then);
+    }
+    check_condition(c, check_at("simulate.shines"), s->shines);
     for (int i = 0; i < s->deny_count; i++)
         check_deny(c, i, &s->deny[i]);
 }

@@ -427,9 +427,18 @@ static const struct cfg_row deny_rows[] = {
     TEXT(profile_deny, "then", then, "", "What it changes."),
     {0}};
 
+static const struct cfg_row follow_rows[] = {
+    TEXT(profile_follow, "when", when, "", "Condition; without one it always holds."),
+    TEXT(profile_follow, "then", then, NULL, "What is so as long as it holds."),
+    {0}};
+
 static const struct cfg_row simulate_rows[] = {
     GROUPS(profile_simulate, "start", start, start_count, start_rows, "When the power comes on."),
     GROUPS(profile_simulate, "drift", drift, drift_count, drift_rows, "What goes by itself."),
+    GROUPS(profile_simulate, "follows", follows, follows_count, follow_rows,
+           "What is always so while something else is: the flag of an overload."),
+    TEXT(profile_simulate, "shines", shines, "",
+         "Condition: the laser's light leaves it; without one: laser.emitting."),
     GROUPS(profile_simulate, "deny", deny, deny_count, deny_rows, "What it refuses."),
     REAL(profile_simulate, "reply_ms", reply_ms, "ms", 0, 5000, "2", "Its time to answer."),
     {0}};

@@ -24,7 +24,7 @@ struct course {
 static bool course(const struct actor *a, const struct profile_drift *d, struct course *ret)
 {
     int value = actor_values_find(&a->now, d->value, strlen(d->value));
-    if (value < 0 || !actor_when(&a->now, d->when))
+    if (value < 0 || (a->link && a->link->tells[value]) || !actor_when(&a->now, d->when))
         return false;
     *ret = (struct course){.value = value, .to = actor_number(&a->now, d->to, value), d->rate};
     if (*d->rate_value)
@@ -72,10 +72,18 @@ static bool arrive(struct actor *a)
     return false;
 }
 
+static void follow(struct actor *a)
+{
+    for (int i = 0; i < the(a)->simulate.follows_count; i++)
+        if (actor_when(&a->now, the(a)->simulate.follows[i].when))
+            actor_do(a, the(a)->simulate.follows[i].then);
+}
+
 static void settle(struct actor *a)
 {
     for (int i = 0; i < CHAIN && arrive(a); i++)
         ;
+    follow(a);
 }
 
 // Until the first arrival, at most most_ns; 0: nothing moves.
@@ -123,6 +131,13 @@ void actor_step(struct actor *a, int64_t t_ns)
     }
 }
 
+void actor_meet(struct actor *a, int64_t t_ns)
+{
+    if (a->link)
+        a->link->meet(a->link, t_ns);
+    actor_step(a, t_ns);
+}
+
 // --- what is done to it --------------------------------------------------------------------------
 
 void actor_do(struct actor *a, const char *assignments)
@@ -132,9 +147,10 @@ void actor_do(struct actor *a, const char *assignments)
 
 int actor_set(struct actor *a, const char *assignments, int64_t t_ns, struct gon_error *err)
 {
-    actor_step(a, t_ns);
+    actor_meet(a, t_ns);
     int rc = actor_then(&a->now, assignments, err);
     settle(a);
+    actor_meet(a, t_ns);
     return rc;
 }
 
@@ -167,6 +183,8 @@ int actor_init(struct actor *a, const struct profile *p, int64_t t_ns, struct go
         rc = readable(p, p->writes[i].name, p->writes[i].then, err);
     for (int i = 0; i < p->simulate.drift_count && rc == 0; i++)
         rc = readable(p, p->simulate.drift[i].value, p->simulate.drift[i].then, err);
+    for (int i = 0; i < p->simulate.follows_count && rc == 0; i++)
+        rc = readable(p, "follows", p->simulate.follows[i].then, err);
     for (int i = 0; i < p->simulate.deny_count && rc == 0; i++)
         rc = readable(p, p->simulate.deny[i].does, p->simulate.deny[i].then, err);
     if (rc)

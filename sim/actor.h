@@ -6,15 +6,25 @@
 //
 // A value goes somewhere (drift) while its row's condition holds, the first such row of a value
 // counts; arrivals are exact in time, other conditions are looked at every 10 ms, or a thousandth
-// of the time passed if that is longer.
+// of the time passed if that is longer. What "follows" says is carried out as often.
 #pragma once
 #include "base/err.h"
 #include "sim/actor_values.h"
 
 #include <stdint.h>
 
+struct actor;
+
+// What the actor has to do with a world around it (sim/actor_world.h): meet brings the world up to
+// that time and puts into the actor's values what it sees of it.
+struct actor_link {
+    void (*meet)(struct actor_link *l, int64_t t_ns);
+    bool tells[PROFILE_VALUES]; // values that come from the world: no drift moves them
+};
+
 struct actor {
     struct actor_values now; // first to look at after actor_step
+    struct actor_link *link; // NULL: it stands alone
     int64_t t_ns;
     bool there[PROFILE_STEPS]; // a drift has arrived and its "then" was done
     int64_t last_ns;           // of the last command; INT64_MIN
@@ -26,6 +36,8 @@ struct actor {
 int actor_init(struct actor *a, const struct profile *p, int64_t t_ns, struct gon_error *err);
 void actor_power_cycle(struct actor *a, int64_t t_ns);
 void actor_step(struct actor *a, int64_t t_ns); // to that time; never back
+// The same, the world around it included: before and after whatever is asked of it or done to it.
+void actor_meet(struct actor *a, int64_t t_ns);
 // Carries out assignments from outside ("interlock = 1", "status.fault = 1"), whatever a value's
 // range. GON_E_INPUT.
 int actor_set(struct actor *a, const char *assignments, int64_t t_ns, struct gon_error *err);

@@ -16,7 +16,7 @@ static struct actor *the(const struct request *r)
 static void do_state(struct request *r)
 {
     const struct actor *a = the(r);
-    actor_step(the(r), r->t_ns);
+    actor_meet(the(r), r->t_ns);
     json_object_set_new(r->out, "now_ns", json_integer(r->t_ns));
     json_object_set_new(r->out, "commands", json_integer((json_int_t)a->commands));
     json_object_set_new(r->out, "too_early", json_integer((json_int_t)a->too_early));
@@ -36,14 +36,19 @@ static json_t *as_json(const struct actor_values *v, int value)
     return isfinite(v->number[value]) ? json_real(v->number[value]) : json_null();
 }
 
-static void do_values(struct request *r)
+void actor_control_values(struct request *r, struct actor *a)
 {
-    const struct actor_values *v = &the(r)->now;
+    const struct actor_values *v = &a->now;
     json_t *all = json_object();
-    actor_step(the(r), r->t_ns);
+    actor_meet(a, r->t_ns);
     for (int i = 0; i < v->profile->values_count; i++)
         json_object_set_new(all, v->profile->values[i].name, as_json(v, i));
     json_object_set_new(r->out, "values", all);
+}
+
+static void do_values(struct request *r)
+{
+    actor_control_values(r, the(r));
 }
 
 // --- what is done --------------------------------------------------------------------------------
@@ -53,7 +58,7 @@ static void do_power_cycle(struct request *r)
     actor_power_cycle(the(r), r->t_ns);
 }
 
-static void set_value(struct request *r, const char *name, const json_t *v)
+static void set_value(struct request *r, struct actor *a, const char *name, const json_t *v)
 {
     char text[PROFILE_TEXT];
     struct gon_error err = {.text = ""};
@@ -65,11 +70,11 @@ static void set_value(struct request *r, const char *name, const json_t *v)
                      json_is_number(v) ? json_number_value(v) : (double)json_is_true(v));
     if (n <= 0 || (size_t)n >= sizeof text)
         request_refuse(r, "'%.40s' must be a number, true, false or a short text", name);
-    else if (actor_set(the(r), text, r->t_ns, &err))
+    else if (actor_set(a, text, r->t_ns, &err))
         request_refuse(r, "%.190s", err.text);
 }
 
-static void set_values(struct request *r, json_t *values)
+void actor_control_set(struct request *r, struct actor *a, json_t *values)
 {
     const char *name;
     json_t *v;
@@ -78,8 +83,13 @@ static void set_values(struct request *r, json_t *values)
     json_object_foreach(values, name, v)
     {
         if (!*r->error)
-            set_value(r, name, v);
+            set_value(r, a, name, v);
     }
+}
+
+static void set_values(struct request *r, json_t *values)
+{
+    actor_control_set(r, the(r), values);
 }
 
 static void do_set(struct request *r)

@@ -183,9 +183,9 @@ static void command(struct actor_message *m, char *line, size_t size, int64_t t_
         return; // broken on its way
     line[text] = 0;
     a->commands++;
-    actor_step(a, t_ns);
+    actor_meet(a, t_ns);
     obey(a, line, &r);
-    actor_step(a, t_ns);
+    actor_meet(a, t_ns);
     reply(m, &r, t_ns);
 }
 

@@ -126,7 +126,7 @@ static double decode(const struct profile *p, const struct profile_value *v, con
 static int read_table(struct actor *a, int table, int address, int count, uint16_t *ret,
                       int64_t t_ns)
 {
-    actor_step(a, t_ns);
+    actor_meet(a, t_ns);
     for (int i = 0; i < count; i++) {
         struct cell c;
         if (find(a, table, address + i, PROFILE_READ, &c))
@@ -246,7 +246,7 @@ static int write_table(struct actor *a, int table, int address, int count, const
 {
     const struct profile *p = the(a);
     bool done[PROFILE_WRITES];
-    actor_step(a, t_ns);
+    actor_meet(a, t_ns);
     struct written w = {.now = a->now};
     int exception = take(a, table, address, count, r, &w);
     const struct profile_deny *deny = NULL;
@@ -267,7 +267,7 @@ static int write_table(struct actor *a, int table, int address, int count, const
     for (int i = 0; i < p->writes_count; i++)
         if (done[i])
             actor_do(a, p->writes[i].then);
-    actor_step(a, t_ns);
+    actor_meet(a, t_ns);
     return 0;
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "sim/benchfile.h"
 
+#include <stdbool.h>
+#include <string.h>
+
 // A number that libconfig reads as a real, whatever its value.
 static const char *real(char text[32], double v)
 {
@@ -23,9 +26,9 @@ static void axis(FILE *out, const struct sim_config *c, int unit, const char *na
             "  { name = \"%s\"; driver = \"%s\"; bus = \"axes\"; unit = %d; unit_name = "
             "\"%s\"; "
             "steps_per_unit = %s;\n    min = %s; max = %s; speed = %s; acceleration = %s; ",
-            name, bench_controllers[c->bench.controller], unit, unit_name,
-            real(t[0], c->steps_per_unit), real(t[1], min), real(t[2], max), real(t[3], c->speed),
-            real(t[4], c->acceleration));
+            name, *c->axes_profile ? c->axes_profile : bench_controllers[c->bench.controller], unit,
+            unit_name, real(t[0], c->steps_per_unit), real(t[1], min), real(t[2], max),
+            real(t[3], c->speed), real(t[4], c->acceleration));
     fprintf(out, "backlash = %s; deadband = %s; }%s\n", real(t[0], backlash),
             real(t[1], 3 / c->steps_per_unit), end);
 }
@@ -42,18 +45,36 @@ static void geometry(FILE *out, const struct sim_config *c)
             real(t[1], c->bench.world.optics.distance_mm));
 }
 
+static bool has(const struct profile *p, const char *value)
+{
+    for (int i = 0; i < p->values_count; i++)
+        if (strcmp(p->values[i].name, value) == 0)
+            return true;
+    return false;
+}
+
+// A detector without a filter of its own settles as one pole does.
+static void detector(FILE *out, const struct sim_config *c, const char *link)
+{
+    char t[32];
+    const struct profile *p = c->bench.detector;
+    fprintf(out,
+            "detector: { driver = \"%s\"; link = \"%s\"; time_constant_s = %s; slope_db = %d; "
+            "monitor_aux = %d; u_linearity_rel = 0.0; };\n",
+            p ? c->detector_profile : "sr830", link, real(t, c->time_constant_s),
+            p && !has(p, "slope_db") ? 6 : c->slope_db, p && !*p->detector.monitor ? 0 : 1);
+}
+
 static void instruments(FILE *out, const struct sim_config *c, const struct benchfile_links *links)
 {
-    char t[3][32];
+    char t[2][32];
     fprintf(out,
-            "laser: { driver = \"cobolt-05\"; link = \"%s\"; power_w = %s; warmup_s = %s; "
+            "laser: { driver = \"%s\"; link = \"%s\"; power_w = %s; warmup_s = %s; "
             "polarisation = \"%s\"; };\n",
-            links->laser, real(t[0], c->power_w), real(t[1], c->bench.world.laser.warmup_s),
+            c->bench.laser ? c->laser_profile : "cobolt-05", links->laser, real(t[0], c->power_w),
+            real(t[1], c->bench.world.laser.warmup_s),
             brdf_state_name((enum brdf_state)c->bench.world.elements.laser));
-    fprintf(out,
-            "detector: { driver = \"sr830\"; link = \"%s\"; time_constant_s = %s; slope_db = %d; "
-            "monitor_aux = 1; u_linearity_rel = 0.0; };\n",
-            links->detector, real(t[0], c->time_constant_s), c->slope_db);
+    detector(out, c, links->detector);
 }
 
 static void state(FILE *out, enum brdf_state is, const char *axis_name, double at, const char *end)

@@ -27,6 +27,12 @@
         .name = n, .type = CFG_GROUP, .fallback = "", .help = text, .rows = table                  \
     }
 
+#define PROFILE(where, text)                                                                       \
+    {                                                                                              \
+        .name = "profile", .type = CFG_STRING, .offset = AT(where),                                \
+        .size = sizeof(((struct sim_config *)0)->where), .fallback = "\"\"", .help = text          \
+    }
+
 static const char *const diffuse_names[] = {"paper", "lambert", NULL}; // enum brdf_diffuse
 
 static const struct cfg_row sample_rows[] = {
@@ -77,6 +83,7 @@ static const struct cfg_row axes_rows[] = {
      .fallback = "\"oriental-az\"",
      .help = "what drives the axes; also written into the bench files for goniod",
      .choices = bench_controllers},
+    PROFILE(axes_profile, "made from this profile instead, a name or a file"),
     REAL("speed", speed, "deg/s", 0.01, 2000, "20", "written into the bench files for goniod"),
     REAL("acceleration", acceleration, "deg/s2", 0.1, 1e6, "60",
          "written into the bench files for goniod"),
@@ -92,6 +99,7 @@ static const struct cfg_row axes_rows[] = {
     {0}};
 
 static const struct cfg_row laser_rows[] = {
+    PROFILE(laser_profile, "made from this profile instead of a Cobolt 05, a name or a file"),
     REAL("power_w", power_w, "W", 0.001, 10, "0.05", "written into the bench files for goniod"),
     REAL("power_max_w", bench.world.laser.power_max_w, "W", 0.001, 10, "0.1",
          "most that the laser accepts"),
@@ -116,6 +124,9 @@ static const struct cfg_row laser_rows[] = {
     {0}};
 
 static const struct cfg_row detector_rows[] = {
+    PROFILE(detector_profile, "made from this profile instead of an SR830, a name or a file"),
+    REAL("signal_per_v", bench.signal_per_v, NULL, 0, 1e12, "0",
+         "of a profile's detector, in its unit: what stands for 1 V; 0: its largest range"),
     REAL("time_constant_s", time_constant_s, "s", 1e-5, 100, "0.1",
          "written into the bench files for goniod"),
     INT("slope_db", slope_db, "dB", 6, 24, "12",
@@ -200,12 +211,27 @@ static int set_choice(const struct cfg_row *row, const char *path, const char *v
     return wrong(path, value, allowed, err);
 }
 
+static int set_text(const struct cfg_row *row, const char *path, const char *value, char *target,
+                    struct gon_error *err)
+{
+    size_t n = strlen(value);
+    if (n >= 2 && value[0] == '"' && value[n - 1] == '"') {
+        value++;
+        n -= 2;
+    }
+    if (n >= row->size)
+        return gon_fail(err, GON_E_INPUT, "%s: longer than %zu characters", path, row->size - 1);
+    snprintf(target + row->offset, row->size, "%.*s", (int)n, value);
+    return 0;
+}
+
 static int set_one(const struct cfg_row *row, const char *path, const char *value, char *target,
                    struct gon_error *err)
 {
     switch (row->type) {
     case CFG_REAL:
     case CFG_INT: return set_number(row, path, value, target, err);
+    case CFG_STRING: return set_text(row, path, value, target, err);
     case CFG_CHOICE: return set_choice(row, path, value, target, err);
     case CFG_BOOL:
         if (strcmp(value, "true") && strcmp(value, "false"))
@@ -290,6 +316,18 @@ int sim_config_defaults(struct sim_config *ret_config, struct gon_error *err)
     return rc;
 }
 
+// A file's path that begins at the folder of the file that names it.
+static void beside(const char *path, const char *was, char *name)
+{
+    char whole[2 * SIM_CONFIG_PATH];
+    const char *slash = strrchr(path, '/');
+    if (!strchr(name, '/') || *name == '/' || !slash || strcmp(was, name) == 0)
+        return;
+    snprintf(whole, sizeof whole, "%.*s/%s", (int)(slash - path), path, name);
+    if (strlen(whole) < SIM_CONFIG_PATH)
+        strcpy(name, whole);
+}
+
 int sim_config_file(struct sim_config *c, const char *path, struct cfg_sink sink)
 {
     struct sim_config whole = *c;
@@ -302,6 +340,9 @@ int sim_config_file(struct sim_config *c, const char *path, struct cfg_sink sink
     cfg_close(f);
     if (mistakes)
         return GON_E_INPUT;
+    beside(path, c->axes_profile, whole.axes_profile);
+    beside(path, c->laser_profile, whole.laser_profile);
+    beside(path, c->detector_profile, whole.detector_profile);
     *c = whole;
     return 0;
 }

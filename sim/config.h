@@ -8,9 +8,14 @@
 
 #include <stdbool.h>
 
+enum { SIM_CONFIG_PATH = 400 };
+
 struct sim_config {
     struct bench_spec bench;
     int seed;
+    // names or files; absolute paths once sim/profiles.h has found them
+    char axes_profile[SIM_CONFIG_PATH], laser_profile[SIM_CONFIG_PATH],
+        detector_profile[SIM_CONFIG_PATH];
     double steps_per_unit, backlash; // of all axes; of those that turn
     // what the bench files for goniod say
     double speed, acceleration; // units/s, units/s2

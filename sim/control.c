@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "sim/control.h"
+#include "sim/actor_control.h"
 #include "sim/request.h"
 
 static struct bench *the(const struct request *r)
@@ -37,14 +38,15 @@ static json_t *time_or_null(int64_t t_ns)
 static json_t *laser_state(const struct request *r)
 {
     const struct sim_laser *l = &the(r)->world.laser;
-    return json_pack("{s:b,s:I,s:f,s:f,s:i,s:i,s:b,s:b,s:b,s:o,s:o,s:I,s:I,s:I}", "emission",
-                     sim_laser_emits(l), "since_ns", (json_int_t)l->emission_since_ns, "power_w",
-                     sim_laser_power_w(l), "setpoint_w", l->setpoint_w, "state", l->state, "fault",
-                     l->fault, "key", l->key, "needs_key_cycle", l->needs_key_cycle,
-                     "interlock_closed", l->interlock_closed, "last_off_ns",
-                     time_or_null(l->last_off_ns), "last_on_ns", time_or_null(l->last_on_ns),
-                     "offs", (json_int_t)l->offs, "ons", (json_int_t)l->ons, "too_early",
-                     (json_int_t)the(r)->laser.too_early);
+    const struct bench_actor *actor = bench_actor(the(r), BENCH_THE_LASER);
+    const uint64_t too_early = actor ? actor->actor.too_early : the(r)->laser.too_early;
+    return json_pack(
+        "{s:b,s:I,s:f,s:f,s:i,s:i,s:b,s:b,s:b,s:o,s:o,s:I,s:I,s:I}", "emission", sim_laser_emits(l),
+        "since_ns", (json_int_t)l->emission_since_ns, "power_w", sim_laser_power_w(l), "setpoint_w",
+        l->setpoint_w, "state", l->state, "fault", l->fault, "key", l->key, "needs_key_cycle",
+        l->needs_key_cycle, "interlock_closed", l->interlock_closed, "last_off_ns",
+        time_or_null(l->last_off_ns), "last_on_ns", time_or_null(l->last_on_ns), "offs",
+        (json_int_t)l->offs, "ons", (json_int_t)l->ons, "too_early", (json_int_t)too_early);
 }
 
 static json_t *detector_state(const struct request *r)
@@ -95,6 +97,43 @@ static void do_power_cycle(struct request *r)
         bench_power_cycle(the(r), (enum world_axis)axis, r->t_ns);
 }
 
+// --- instruments made from profiles --------------------------------------------------------------
+
+static struct bench_actor *the_actor(struct request *r)
+{
+    int part = request_choice(r, "part", bench_part_names, BENCH_PARTS);
+    struct bench_actor *a = part < 0 ? NULL : bench_actor(the(r), part);
+    if (part >= 0 && !a)
+        request_refuse(r, "'%s' is not made from a profile", bench_part_names[part]);
+    return a;
+}
+
+static void do_values(struct request *r)
+{
+    struct bench_actor *a = the_actor(r);
+    if (a)
+        actor_control_values(r, &a->actor);
+}
+
+static void set_values(struct request *r, json_t *values)
+{
+    struct bench_actor *a = the_actor(r);
+    if (a)
+        actor_control_set(r, &a->actor, values);
+}
+
+// What belongs to the laser that is built in.
+static bool own_laser(struct request *r, const char *key)
+{
+    if (!bench_actor(the(r), BENCH_THE_LASER))
+        return true;
+    request_refuse(r,
+                   "'%s' is of the laser that is built in; this one is made from a profile: set "
+                   "its values (\"part\":\"laser\")",
+                   key);
+    return false;
+}
+
 static const char *const interlock_words[] = {"open", "closed"};
 static const char *const key_words[] = {"off", "on"};
 
@@ -102,7 +141,7 @@ static void set_interlock(struct request *r, json_t *v)
 {
     (void)v;
     int i = request_choice(r, "interlock", interlock_words, 2);
-    if (i >= 0)
+    if (i >= 0 && own_laser(r, "interlock"))
         sim_laser_set_interlock(&the(r)->world.laser, i == 1);
 }
 
@@ -110,14 +149,14 @@ static void set_key(struct request *r, json_t *v)
 {
     (void)v;
     int i = request_choice(r, "key", key_words, 2);
-    if (i >= 0)
+    if (i >= 0 && own_laser(r, "key"))
         sim_laser_set_key(&the(r)->world.laser, i == 1);
 }
 
 static void set_ignore_off(struct request *r, json_t *v)
 {
     bool on = request_truth(r, "ignore_off", v);
-    if (!*r->error)
+    if (!*r->error && own_laser(r, "ignore_off"))
         the(r)->world.laser.ignores_off = on;
 }
 
@@ -162,6 +201,8 @@ static void do_set(struct request *r)
                                               {"drop", request_set_drop},
                                               {"delay_ms", request_set_delay},
                                               {"alarm", set_alarm},
+                                              {"values", set_values},
+                                              {"part", NULL},
                                               {"term", set_term},
                                               {"wire", NULL},
                                               {"axis", NULL},
@@ -175,6 +216,7 @@ char *control_answer(struct bench *bench, struct wire *wires, const char *line, 
 {
     static const struct request_verb verbs[] = {{"state", do_state},
                                                 {"truth", do_truth},
+                                                {"values", do_values},
                                                 {"plug", request_plug},
                                                 {"unplug", request_unplug},
                                                 {"mute", request_mute},

@@ -178,3 +178,10 @@ void sim_laser_set_interlock(struct sim_laser *l, bool closed)
     if (!closed)
         l->fault = 3;
 }
+
+void sim_laser_drive(struct sim_laser *l, double power_w)
+{
+    l->warmth = 1;
+    l->setpoint_w = power_w;
+    enter(l, power_w > 0 ? SIM_LASER_COMPLETED : SIM_LASER_OFF);
+}

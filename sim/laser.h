@@ -78,6 +78,10 @@ void sim_laser_clear_fault(struct sim_laser *l);
 void sim_laser_set_key(struct sim_laser *l, bool on); // off and on again is a cycle
 void sim_laser_set_interlock(struct sim_laser *l, bool closed);
 
+// For a controller that has a state machine of its own (sim/actor_world.h): light of this power
+// from now on, 0: none. What remains of this laser are drift and noise.
+void sim_laser_drive(struct sim_laser *l, double power_w);
+
 bool sim_laser_emits(const struct sim_laser *l);
 double sim_laser_power_w(const struct sim_laser *l);   // of the beam, now
 double sim_laser_current_a(const struct sim_laser *l); // diode

@@ -3,6 +3,7 @@
 #include "base/options.h"
 #include "sim/actor_served.h"
 #include "sim/bench_served.h"
+#include "sim/profiles.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -97,7 +98,7 @@ static int configure(struct sim_config *c, struct arguments *a, struct gon_error
         rc = sim_config_set(c, a->sets[i], equals + 1, err);
     }
     sim_config_finish(c);
-    return rc;
+    return rc ? rc : profiles_of_bench(c, (struct cfg_sink){say, NULL}, err);
 }
 
 static void run(struct server *server, const struct arguments *a)
@@ -110,7 +111,7 @@ static void run(struct server *server, const struct arguments *a)
 
 static int serve_bench(struct arguments *a, struct gon_error *err)
 {
-    struct sim_config config;
+    struct sim_config config = {.seed = 0};
     struct server *server;
     int rc = configure(&config, a, err);
     struct served *bench = rc == 0 ? bench_served_new(&config) : NULL;
@@ -118,31 +119,16 @@ static int serve_bench(struct arguments *a, struct gon_error *err)
         rc = gon_fail(err, GON_E_SYSTEM, "out of memory");
     if (rc == 0)
         rc = server_open(bench, a->run_dir, &server, err);
-    if (rc)
-        return rc;
-    printf("goniosim %s: %s, seed %d%s\n", GONIO_VERSION, a->run_dir, config.seed,
-           a->fast ? ", fast" : "");
-    run(server, a);
-    return 0;
+    if (rc == 0)
+        printf("goniosim %s: %s, seed %d%s\n", GONIO_VERSION, a->run_dir, config.seed,
+               a->fast ? ", fast" : "");
+    if (rc == 0)
+        run(server, a);
+    profiles_free(&config);
+    return rc;
 }
 
 // --- one instrument ------------------------------------------------------------------------------
-
-// A profile in this folder is meant by "x.cfg", too.
-static int load(const char *name, struct profile **ret_profile, struct gon_error *err)
-{
-    char path[PATH_MAX];
-    size_t size = strlen(name);
-    bool file = !strchr(name, '/') && size > 4 && strcmp(name + size - 4, ".cfg") == 0;
-    int rc = 0;
-    if (file)
-        snprintf(path, sizeof path, "%s", name);
-    else
-        rc = profile_find(name, NULL, path, sizeof path, err);
-    if (rc == 0 && profile_load(path, (struct cfg_sink){say, NULL}, ret_profile, NULL))
-        rc = gon_fail(err, GON_E_INPUT, "%s is not usable; nothing was started", path);
-    return rc;
-}
 
 // The folder of the run when none was given, to be removed afterwards.
 static int make_folder(char *ret_path, size_t size, struct gon_error *err)
@@ -179,7 +165,7 @@ static int serve_profile(const struct arguments *a, struct gon_error *err)
     if (a->config || a->set_count > 0 || a->seed >= 0)
         return gon_fail(err, GON_E_INPUT,
                         "--config, --set and --seed are of the bench, not of --profile");
-    int rc = load(a->profile, &p, err);
+    int rc = profiles_load(a->profile, (struct cfg_sink){say, NULL}, &p, NULL, err);
     if (rc == 0 && !a->run_dir)
         rc = make_folder(folder, sizeof folder, err);
     if (rc == 0)

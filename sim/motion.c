@@ -141,3 +141,13 @@ void motion_halt(struct motion *m, int64_t t_ns)
 {
     begin(m, t_ns);
 }
+
+void motion_put(struct motion *m, double at, int64_t t_ns)
+{
+    at = clamp(at, m->min, m->max);
+    if (at == motion_at(m, t_ns).motor)
+        return;
+    begin(m, t_ns);
+    m->motor0 = at;
+    m->load0 = clamp(m->load0, at, at + m->backlash);
+}

@@ -45,4 +45,5 @@ void motion_go(struct motion *m, double target, double speed, double acceleratio
                double deceleration, int64_t t_ns);
 void motion_stop(struct motion *m, double deceleration, int64_t t_ns);
 void motion_halt(struct motion *m, int64_t t_ns); // at once: no current, or a limit was met
+void motion_put(struct motion *m, double at, int64_t t_ns); // something else has moved it there
 double motion_left_s(const struct motion *m, int64_t t_ns); // until the plan ends; 0 when it has

@@ -80,11 +80,26 @@ static bool seen(const struct world *w)
     return same;
 }
 
+static void follow_light(struct world *w, int64_t t_ns)
+{
+    if (w->light.at)
+        sim_laser_drive(&w->laser, w->light.at(w->light.ctx, t_ns));
+    sim_laser_step(&w->laser, t_ns);
+}
+
+static void follow_places(struct world *w, int64_t t_ns)
+{
+    for (int i = 0; i < WORLD_AXES; i++)
+        if (w->place[i].at)
+            motion_put(&w->axis[i], w->place[i].at(w->place[i].ctx, t_ns), t_ns);
+}
+
 // Optics is most of the work, and most of the time nothing moves.
 static double detected_per_w(struct world *w, int64_t t_ns)
 {
     double at[WORLD_AXES];
     bool rest = true;
+    follow_places(w, t_ns);
     if (seen(w))
         return w->view.per_w;
     for (int i = 0; i < WORLD_AXES; i++) {
@@ -127,17 +142,18 @@ void world_see(struct world *w, int64_t t_ns)
     double most_ns = BACK_TC * w->lockin.time_constant_s * 1e9;
     if (t_ns - w->t_ns > most_ns) {
         w->t_ns = t_ns - (int64_t)most_ns;
-        sim_laser_step(&w->laser, w->t_ns);
+        follow_light(w, w->t_ns);
     }
     int64_t step_ns = (int64_t)fmin(w->lockin.time_constant_s * 1e9 / STEPS_PER_TC, 1e15);
     while (w->t_ns < t_ns) {
         int64_t next_ns = t_ns - w->t_ns > step_ns ? w->t_ns + step_ns : t_ns;
         int64_t middle_ns = w->t_ns + (next_ns - w->t_ns) / 2;
-        sim_laser_step(&w->laser, middle_ns);
+        follow_light(w, middle_ns);
         lockin_step(&w->lockin, world_input_v(w, middle_ns), (double)(next_ns - w->t_ns) * 1e-9);
         w->t_ns = next_ns;
     }
-    sim_laser_step(&w->laser, t_ns);
+    follow_light(w, t_ns);
+    follow_places(w, t_ns);
 }
 
 double world_aux_v(struct world *w, int input)

@@ -45,8 +45,16 @@ struct world_spec {
     double reference_hz;
 };
 
+// A laser's power in W, or an axis' motor in its unit, that something else simulates: asked at
+// times that never go back. NULL: the world's own.
+struct world_source {
+    double (*at)(void *ctx, int64_t t_ns);
+    void *ctx;
+};
+
 struct world {
     struct world_spec spec;
+    struct world_source light, place[WORLD_AXES];
     int64_t t_ns; // laser and filter are here
     struct motion axis[WORLD_AXES];
     struct sim_laser laser;

@@ -248,6 +248,19 @@ static void a_detector_that_somebody_touched_is_set_up_again(void **state)
     assert_int_equal(s->b.setups, setups + 1);
 }
 
+// One sample has no scatter: 0. What was not measured has none either, and that is not 0.
+static void one_sample_without_a_monitor_is_a_reading(void **state)
+{
+    struct setting *s = *state;
+    s->b.no_monitor = true;
+    const struct acquire_wish wish = {.count = 1, .monitor_least_v = (double)NAN};
+    struct acquire_reading r;
+    assert_int_equal(acquire_attempt(s->in, &s->a, &wish, s->cancel, &r, NULL), 0);
+    assert_int_equal(r.count, 1);
+    assert_true(r.signal_sd_v == 0 && isfinite(r.signal_v));
+    assert_true(isnan(r.monitor_v) && isnan(r.monitor_sd_v));
+}
+
 static void a_cancel_ends_it(void **state)
 {
     struct setting *s = *state;
@@ -271,6 +284,7 @@ int main(void)
         T(a_lost_light_is_flagged_and_not_tried_again),
         T(a_lost_reference_is_tried_again),
         T(a_detector_that_somebody_touched_is_set_up_again),
+        T(one_sample_without_a_monitor_is_a_reading),
         T(a_cancel_ends_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
