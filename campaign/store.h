@@ -143,6 +143,9 @@ int store_append_fit(struct store *s, int64_t t_utc_ms, const struct fit_record 
 
 // --- reading -------------------------------------------------------------------------------------
 const char *store_path(const struct store *s);
+// The file as it is in one moment, whoever writes it, as a single file on the disk; GON_E_REFUSED:
+// there is one of that name.
+int store_copy(struct store *s, const char *path, struct gon_error *err);
 int store_read_plan(struct store *s, struct plan *ret_plan,
                     struct gon_error *err); // done and attempts filled in
 // All readings of a sweep (-1: of all sweeps) in the order of the plan; returns how many, free

@@ -7,7 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
-// SQLite reads one moment of the file, whoever writes it meanwhile, and does not sync the copy.
+// SQLite reads one moment of the file, whoever writes it meanwhile, and does not sync the copy. It
+// counts the copy as writing, too: a connection for reading is opened up as long as it takes.
 static int vacuum_into(struct store *s, const char *path, struct gon_error *err)
 {
     sqlite3_stmt *q;
@@ -15,7 +16,11 @@ static int vacuum_into(struct store *s, const char *path, struct gon_error *err)
     if (rc < 0)
         return rc;
     store_db_bind_text(q, 1, path);
-    return store_db_finish(s, q, err);
+    sqlite3_exec(s->db, "PRAGMA query_only = 0", NULL, NULL, NULL);
+    rc = store_db_finish(s, q, err);
+    if (s->mode == STORE_READ)
+        sqlite3_exec(s->db, "PRAGMA query_only = 1", NULL, NULL, NULL);
+    return rc;
 }
 
 int store_copy(struct store *s, const char *path, struct gon_error *err)

@@ -70,7 +70,3 @@ int store_put_profile(struct store *s, int64_t t_utc_ms, const struct store_prof
 // campaign/store_migrate.c: a file of an older version becomes one of this version, a transaction a
 // step, after a copy of it was made ("FILE.v1-backup"). s->notice says so.
 int store_migrate(struct store *s, struct gon_error *err);
-
-// campaign/store_copy.c: the file as it is in one moment, complete and on the disk, under a name
-// that must be free.
-int store_copy(struct store *s, const char *path, struct gon_error *err);

@@ -146,3 +146,43 @@ def test_a_folder_has_one_daemon(daemon, start_sim, tmp_path):
     assert f"in use by process {daemon.pid}" in second.errors()
     assert "--dir" in second.errors()
     assert daemon.gonio("status").returncode == 0
+
+
+def test_backup_is_a_verified_copy(whole, tmp_path):
+    copy = tmp_path / "copy.gonio"
+    made = gonio("backup", whole, copy)
+    assert made.returncode == 0, made.stderr
+    assert made.stdout.startswith(f"{copy}: a copy of {whole}, whole: ")
+    for table in ("reading", "plan", "meta", "profile", "event", "state", "reduced", "fit"):
+        assert query(copy, f"select * from {table}") == query(whole, f"select * from {table}"), table
+    assert query(copy, "pragma user_version") == query(whole, "pragma user_version")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["copy.gonio"]
+    before = copy.read_bytes()
+    again = gonio("backup", whole, copy)
+    assert again.returncode == 4 and "there already" in again.stderr
+    assert copy.read_bytes() == before
+    folder = tmp_path / "safe"
+    folder.mkdir()
+    assert json.loads(gonio("backup", "--json", whole, folder).stdout)["copy"] == str(folder / whole.name)
+    assert gonio("verify", folder / whole.name).returncode == 0
+    bad = damaged(whole, tmp_path, "update reading set signal_v = 2 * signal_v where sweep = 1 and point = 3")
+    kept = gonio("backup", bad, tmp_path / "bad-copy.gonio")
+    assert kept.returncode == 1 and "sweep 1, point 3" in kept.stderr and "is damaged" in kept.stderr
+    assert gonio("backup", whole, tmp_path / "no" / "copy.gonio").returncode == 1
+    assert gonio("backup", whole).returncode == 2
+
+
+def test_backup_while_it_is_measured(daemon, tmp_path):
+    """Again and again: each copy is whole and the run does not notice."""
+    reply = daemon.submit(BRIEF.replace("step_deg = 10.0", "step_deg = 0.5"), "long.cfg")
+    events, last = daemon.follow(0), 0
+    events.until(lambda e: e["event"] == "reading" and e["run"] == reply["run"])
+    for k in range(5):
+        made = daemon.gonio("backup", "--json", reply["run"], tmp_path / f"{k}.gonio")
+        assert made.returncode == 0, made.stderr
+        readings = json.loads(made.stdout)["readings"]
+        assert readings >= max(last, 1)
+        last = readings
+    events.until_state(reply["run"], "done")
+    paused = query(reply["file"], "select why from state where state = 'paused'")
+    assert paused == []
