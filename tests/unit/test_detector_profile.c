@@ -147,9 +147,10 @@ static void ranges_go_from_the_most_sensitive_and_are_set(void **state)
         const char *profile;
         int ranges;
         double least, most;
-    } rows[] = {{"sr860", 28, 1e-9, 1.0},
-                {"keithley-6485", 8, 2e-9, 2e-2},
-                {"thorlabs-pm100", 9, 1e-8, 1.0}};
+        const char *dark; // fits every range
+    } rows[] = {{"sr860", 28, 1e-9, 1.0, "x = 0"},
+                {"keithley-6485", 8, 2e-9, 2e-2, "current_a = 0"},
+                {"thorlabs-pm100", 9, 1e-8, 1.0, "power_w = 0"}};
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct gon_error err;
@@ -158,6 +159,7 @@ static void ranges_go_from_the_most_sensitive_and_are_set(void **state)
         assert_int_equal(count, rows[i].ranges);
         assert_true(d->ops->full_scale_v(d, 0) == rows[i].least);
         assert_true(d->ops->full_scale_v(d, count - 1) == rows[i].most);
+        profiled_do(rows[i].dark);
         condition(d);
         for (int range = 0; range < count; range++) {
             const double full = d->ops->full_scale_v(d, range);
