@@ -41,6 +41,7 @@ struct instrument {
     struct motor motor[INSTRUMENT_AXES];
     struct profile *laser_profile, *detector_profile; // loaded when first needed; NULL before
     struct safety *safety;
+    enum safety_light behind; // of the laser whose place another took; SAFETY_LIGHT_OFF: none did
     const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;
     struct detector *detector;
