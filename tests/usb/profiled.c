@@ -21,8 +21,8 @@ static int make(struct profiled *p, const char *name, struct gon_error *err)
         return rc;
     actor_message_init(&p->message, &p->actor);
     snprintf(p->serial, sizeof p->serial, "%s", l.place);
-    p->identity = (struct sim_usb_identity){l.vendor, l.product, "the profile", p->profile->name,
-                                            p->serial};
+    p->identity =
+        (struct sim_usb_identity){l.vendor, l.product, "the profile", p->profile->name, p->serial};
     return 0;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The instrument that a profile describes, as `gonio profile sim` serves it (sim/actor.h), as a port
-// to be plugged in over USB, with the numbers of the profile's own example of a link.
+// The instrument that a profile describes, as `gonio profile sim` serves it (sim/actor.h), as a
+// port to be plugged in over USB, with the numbers of the profile's own example of a link.
 #pragma once
 #include "drivers/profile.h"
 #include "sim/actor_message.h"

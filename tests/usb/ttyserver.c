@@ -50,8 +50,8 @@ static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
 {
     struct port_of *p = ctx;
     const gulong request = umockdev_ioctl_client_get_request(client);
-    const bool lines = request == TIOCMGET || request == TIOCMSET || request == TIOCMBIS ||
-                       request == TIOCMBIC;
+    const bool lines =
+        request == TIOCMGET || request == TIOCMSET || request == TIOCMBIS || request == TIOCMBIC;
     const bool known = lines || request == TIOCEXCL || request == TIOCNXCL;
     (void)handler;
     usbserver_lock(p->server->usb);
@@ -75,12 +75,12 @@ static void add(struct ttyserver *t, const char *text)
 static void describe(struct ttyserver *t, const struct port_of *p, const struct tty_adapter *a)
 {
     const bool named = g_strcmp0(a->serial, "-") != 0;
-    char *text = g_strdup_printf(
-        "P: %s\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: DEVTYPE=usb_device\n"
-        "E: BUSNUM=%03d\nE: DEVNUM=%03d\nA: busnum=%d\\n\nA: devnum=%d\\n\n"
-        "A: idVendor=%04x\\n\nA: idProduct=%04x\\n\n%s%s%s",
-        p->device, a->bus, a->address, a->bus, a->address, a->vendor, a->product,
-        named ? "A: serial=" : "", named ? a->serial : "", named ? "\\n\n" : "");
+    char *text =
+        g_strdup_printf("P: %s\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: DEVTYPE=usb_device\n"
+                        "E: BUSNUM=%03d\nE: DEVNUM=%03d\nA: busnum=%d\\n\nA: devnum=%d\\n\n"
+                        "A: idVendor=%04x\\n\nA: idProduct=%04x\\n\n%s%s%s",
+                        p->device, a->bus, a->address, a->bus, a->address, a->vendor, a->product,
+                        named ? "A: serial=" : "", named ? a->serial : "", named ? "\\n\n" : "");
     add(t, text);
     g_free(text);
     const char *name = p->node + sizeof "/dev/" - 1;

@@ -7,8 +7,8 @@
 //
 //   profile NAME               "ok DEVICE": the instrument of that profile, at its own link
 //   bridge PORT END VID PID SERIAL
-//                              "ok DEVICE": the one behind 127.0.0.1:PORT, whose lines end with END:
-//                              cr, lf or crlf
+//                              "ok DEVICE": the one behind 127.0.0.1:PORT, whose lines end with
+//                              END: cr, lf or crlf
 //
 //   plug DEVICE BUS ADDRESS
 //   unplug DEVICE
@@ -122,8 +122,8 @@ static const char *make(struct simulator *s, const char *line, char *text, size_
     char name[200];
     if (s->devices == USBSERVER_DEVICES)
         return NULL;
-    const bool made = sscanf(line, "profile %199s", name) == 1 ? add_profile(s, name)
-                                                               : add_bridge(s, line);
+    const bool made =
+        sscanf(line, "profile %199s", name) == 1 ? add_profile(s, name) : add_bridge(s, line);
     snprintf(text, size, "ok %d", s->devices - 1);
     return made ? text : NULL;
 }
