@@ -28,8 +28,8 @@ int session_open(const struct profile *p, const char *link, struct clk *clk,
 // Over a bus, which is borrowed. NULL without memory.
 struct session *session_on_bus(const struct profile *p, struct bus *bus, int unit);
 void session_free(struct session *s);
-// Whatever was learnt of the instrument is forgotten, as another one may be there. Of a bus: nothing
-// is opened, its owner does it.
+// Whatever was learnt of the instrument is forgotten, as another one may be there. Of a bus:
+// nothing is opened, its owner does it.
 int session_reopen(struct session *s, struct gon_error *err);
 
 const struct profile *session_profile(const struct session *s);
