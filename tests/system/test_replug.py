@@ -181,7 +181,7 @@ def start_run(start_sim, start_daemon, tmp_path):
 
     yield start
     for run in runs:
-        run.daemon.end()  # while there is a laser that can be told
+        assert run.daemon.end() == 0, "OFF was not confirmed"  # while there is a laser that can be told
     for line in lines:
         line.close()
 
