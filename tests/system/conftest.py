@@ -256,7 +256,7 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None, **kwargs):
                           env={**os.environ, "NO_COLOR": "", **(env or {})}, **kwargs)
 
 
-LONGEST = ["test_paper_campaign", "test_kill", "test_unplug", "test_safety", "test_daemon"]
+LONGEST = ["test_paper_campaign", "test_kill", "test_unplug", "test_replug", "test_safety", "test_daemon"]
 
 
 def pytest_collection_modifyitems(items):
