@@ -143,7 +143,7 @@ $(B)/tests/$(1): $(call usb_parts,$(1)) $(patsubst %,$(B)/lib%.a,$(call usb_name
 	    $(if $(filter usbsim,$(1)),-lumockdev -lgobject-2.0 -lglib-2.0)
 endef
 $(foreach u,$(USB_PROGRAMS),$(eval $(call usb_rules,$(u))))
-$(B)/obj/tests/usb/usbserver.o: CPPFLAGS += $(UMOCKDEV)
+$(B)/obj/tests/usb/usbserver.o $(B)/obj/tests/usb/ttyserver.o: CPPFLAGS += $(UMOCKDEV)
 
 unit: $(UNIT_TESTS:%=$(B)/tests/%)
 	$(Q)scripts/unit $(B)/tests $(UNIT_TESTS)

@@ -121,10 +121,25 @@ static int wait_for_operator(struct engine *e)
     return 0;
 }
 
+// Another device answers in a lost one's place: waiting alone does not help, so that is said.
+static void tell_refused(struct engine *e, char told[sizeof((struct part_state *)0)->problem])
+{
+    struct instrument_snapshot s;
+    instrument_snapshot(e->in, &s);
+    for (int i = next_lost(&s, 0); i < PART_COUNT; i = next_lost(&s, i + 1))
+        if (s.part[i].refused && strcmp(told, s.part[i].problem) != 0) {
+            strcpy(told, s.part[i].problem);
+            engine_enter_pause(e, told);
+            return;
+        }
+}
+
 // Until every device is back, or an operator took the pause over.
 static int wait_for_devices(struct engine *e)
 {
+    char told[sizeof((struct part_state *)0)->problem] = "";
     do {
+        tell_refused(e, told);
         if (engine_pause_asked(e)) {
             e->wanted = true;
             engine_enter_pause(e, by_operator);

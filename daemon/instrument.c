@@ -5,6 +5,7 @@
 #include "daemon/instrument_inside.h"
 #include "drivers/bus.h"
 #include "drivers/device.h"
+#include "drivers/identity.h"
 #include "drivers/profile.h"
 
 #include <assert.h>
@@ -111,6 +112,8 @@ int instrument_need(struct instrument *in, enum instrument_part part, struct gon
 {
     assert(in->part[part].link != PART_ABSENT);
     in->talking = (int)part;
+    if (in->part[part].refused)
+        return gon_fail(err, GON_E_GONE, "%s", in->part[part].problem);
     if (instrument_is_there(in, part))
         return 0;
     return instrument_note(
@@ -175,12 +178,23 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     return m->axis->ops->stop(m->axis, err);
 }
 
-static int connect_laser(struct instrument *in, struct gon_error *err)
+int instrument_recognise(struct part_state *p, int rc, const char *identity, struct gon_error *err)
 {
-    struct part_state *p = &in->part[PART_LASER];
+    if (rc >= 0)
+        rc = identity_same(p->identity, identity, err);
+    if (rc >= 0)
+        snprintf(p->identity, sizeof p->identity, "%s", identity);
+    p->refused |= rc == GON_E_DEVICE;
+    return rc;
+}
+
+static int begin_laser(struct instrument *in, char *ret_identity, size_t size,
+                       struct gon_error *err)
+{
+    const struct part_state *p = &in->part[PART_LASER];
     struct laser *laser;
     if (in->safety)
-        return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
+        return safety_reopen(in->safety, ret_identity, size, err);
     int rc = device_open_laser(p->driver, in->bench->folder, &in->laser_profile, p->address,
                                &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
@@ -188,7 +202,21 @@ static int connect_laser(struct instrument *in, struct gon_error *err)
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
     safety_obey(in->safety, in->stop);
-    return safety_begin(in->safety, p->identity, sizeof p->identity, err);
+    return safety_begin(in->safety, ret_identity, size, err);
+}
+
+// An OFF that is not confirmed is no matter of identity: it goes on being tried.
+static int connect_laser(struct instrument *in, struct gon_error *err)
+{
+    struct part_state *p = &in->part[PART_LASER];
+    const enum safety_light left = instrument_light_left(in);
+    char identity[sizeof p->identity] = "";
+    int rc = begin_laser(in, identity, sizeof identity, err);
+    if (rc < 0 && (!in->safety || safety_pending(in->safety)))
+        return rc;
+    rc = instrument_recognise(p, rc, identity, err);
+    in->behind = rc >= 0 ? SAFETY_LIGHT_OFF : left; // whoever confirmed OFF has to be the laser
+    return rc;
 }
 
 int instrument_write_set_up(struct instrument *in, struct gon_error *err)
@@ -207,8 +235,11 @@ static int connect_detector(struct instrument *in, struct gon_error *err)
                  ? in->detector->ops->reopen(in->detector, err)
                  : device_open_detector(p->driver, in->bench->folder, &in->detector_profile,
                                         p->address, &in->breathing.clk, NULL, &in->detector, err);
-    if (rc >= 0)
-        rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
+    if (rc < 0)
+        return rc;
+    char identity[sizeof p->identity] = "";
+    rc = in->detector->ops->identify(in->detector, identity, sizeof identity, err);
+    rc = instrument_recognise(p, rc, identity, err);
     return rc < 0 ? rc : instrument_write_set_up(in, err);
 }
 
@@ -224,8 +255,10 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
              : part == PART_MONITOR  ? instrument_connect_monitor(in, err)
                                      : instrument_connect_device(in, part, err);
     rc = instrument_note(in, part, rc, err);
-    if (rc >= 0)
+    if (rc >= 0) {
+        in->part[part].refused = false;
         return 0;
+    }
     // Whatever the reason was: it is not usable, and trying again may help.
     in->part[part].link = PART_LOST;
     snprintf(in->part[part].problem, sizeof in->part[part].problem, "%.*s",
@@ -355,7 +388,7 @@ bool instrument_free(struct instrument *in)
     if (!in)
         return true;
     in->watcher = NULL;
-    const bool dark = in->safety && safety_free(in->safety);
+    const bool dark = in->safety && safety_free(in->safety) && in->behind == SAFETY_LIGHT_OFF;
     in->safety = NULL;
     for (int i = 0; i < INSTRUMENT_AXES; i++)
         if (in->motor[i].axis) {

@@ -9,6 +9,10 @@
 // brings it back. Errors that name a device name it once. The drivers get no cancel token: whatever
 // ends a run must still reach the laser and the axes; their own time limits bound each call.
 //
+// What comes back is the same device by the serial number it gave before (drivers/identity.h), or
+// stays lost and is not used: calls fail with the reason. An OFF that another laser confirmed says
+// nothing of the light of the one before.
+//
 // Every wait goes through instrument_wait, in slices of at most 100 ms that renew the laser's lease
 // (safety_tick) and call the watcher. Drivers are given a clock whose sleeping does the same.
 #pragma once
@@ -49,6 +53,8 @@ struct part_state {
     const char *address;  // of its link; "" when made from ready objects
     char identity[96];    // what it said it is
     char problem[240];    // why it is lost; "" when it is not
+    bool refused;         // it answered and is not to be used, as problem says: another device, by
+                          // its serial number or kind; until the right one is there
     uint64_t errors;      // failed calls since the start
     uint64_t returns;     // times it came back
     char last_error[240]; // "" when there was none since the start
@@ -141,7 +147,7 @@ int instrument_reconnect(struct instrument *in);
 
 // A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off,
 // an axis stopped, a detector set up as configured; a selector stays where it is. 0 when it is
-// there.
+// there. GON_E_DEVICE: another device answers in its place.
 enum instrument_part instrument_lost(const struct instrument *in);
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_has(const struct instrument *in, enum instrument_part part);

@@ -61,6 +61,7 @@ struct instrument {
     struct motor motor[INSTRUMENT_AXES];
     struct profile *laser_profile, *detector_profile; // loaded when first needed; NULL before
     struct safety *safety;
+    enum safety_light behind; // of the laser whose place another took; SAFETY_LIGHT_OFF: none did
     const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;
     struct detector *detector;
@@ -77,6 +78,9 @@ struct instrument {
 // rc.
 int instrument_note(struct instrument *in, enum instrument_part part, int rc,
                     struct gon_error *err);
+// What came of identifying whoever answers: whether it is the part that was there before, by its
+// serial number; then the part has the identity. GON_E_DEVICE: another one, and the part is refused.
+int instrument_recognise(struct part_state *p, int rc, const char *identity, struct gon_error *err);
 // 0 when the part's object exists, so that it can be asked at all.
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_is_there(const struct instrument *in, enum instrument_part part); // can be asked

@@ -66,8 +66,11 @@ int instrument_connect_monitor(struct instrument *in, struct gon_error *err)
                  ? m->detector->ops->reopen(m->detector, err)
                  : device_open_detector(p->driver, in->bench->folder, &m->profile, p->address,
                                         &in->breathing.clk, NULL, &m->detector, err);
-    if (rc >= 0)
-        rc = m->detector->ops->identify(m->detector, p->identity, sizeof p->identity, err);
+    if (rc < 0)
+        return rc;
+    char identity[sizeof p->identity] = "";
+    rc = m->detector->ops->identify(m->detector, identity, sizeof identity, err);
+    rc = instrument_recognise(p, rc, identity, err);
     return rc < 0 ? rc : set_up(in, err);
 }
 

@@ -28,8 +28,8 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
     *s = (struct instrument_snapshot){
         .t_ns = instrument_now_ns(in),
         .laser = in->laser,
-        .emission = in->safety && safety_emission(in->safety),
-        .off_unconfirmed = in->safety && safety_pending(in->safety),
+        .emission = instrument_light_left(in) == SAFETY_LIGHT_MAYBE,
+        .off_unconfirmed = in->safety && (safety_pending(in->safety) || in->behind),
         .range = in->range,
         .full_scale_v = in->range >= 0 ? instrument_full_scale_v(in, in->range) : (double)NAN,
         .signal_v = in->sample.signal_v,

@@ -32,8 +32,9 @@ int session_on_transport(const struct profile *p, struct transport *transport,
 // Over a bus, which is borrowed. NULL without memory.
 struct session *session_on_bus(const struct profile *p, struct bus *bus, int unit);
 void session_free(struct session *s);
-int session_reopen(struct session *s,
-                   struct gon_error *err); // of a bus: nothing, its owner does it
+// Whatever was learnt of the instrument is forgotten, as another one may be there. Of a bus:
+// nothing is opened, its owner does it.
+int session_reopen(struct session *s, struct gon_error *err);
 
 const struct profile *session_profile(const struct session *s);
 const char *session_link(const struct session *s);

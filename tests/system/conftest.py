@@ -126,9 +126,10 @@ class Stream:
         self.response = self.connection.getresponse()
         self.seen = []
 
-    def next(self):
+    def next(self, end=float("inf")):
+        """The next event, before the time end: pings alone keep the connection for ever."""
         data = None
-        while True:
+        while time.monotonic() < end:
             line = self.response.readline().decode()
             if not line:
                 raise AssertionError(f"the event stream ended; seen {self.seen[-5:]}")
@@ -137,12 +138,13 @@ class Stream:
             elif line == "\n" and data is not None:
                 self.seen.append(data)
                 return data
+        raise AssertionError(f"no event; last events {self.seen[-5:]}")
 
     def until(self, wanted, patience_s=PATIENCE_S):
         """The first event for which wanted(event) is true."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end:
-            event = self.next()
+            event = self.next(end)
             if wanted(event):
                 return event
         raise AssertionError(f"not within {patience_s} s; last events {self.seen[-5:]}")
@@ -255,7 +257,8 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None, **kwargs):
                           env={**os.environ, "NO_COLOR": "", **(env or {})}, **kwargs)
 
 
-LONGEST = ["test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_safety", "test_daemon"]
+LONGEST = ["test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_replug", "test_safety",
+           "test_daemon"]
 
 
 def pytest_collection_modifyitems(items):

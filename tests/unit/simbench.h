@@ -57,6 +57,7 @@ struct simbench {
     struct link_stats bus; // as the axes' bus would keep it; the others have no link
     int range;
     double step_delay_s; // virtual time each call costs
+    const char *laser_is, *detector_is; // what they say they are; NULL: no serial number in it
 
     // faults: the fail_at-th call from now on fails; or one call of a device
     long calls, fail_at;
@@ -224,9 +225,10 @@ static inline int simbench_laser_identify(struct laser *l, char *text, size_t si
                                           struct gon_error *err)
 {
     bool done;
-    int rc = simbench_call(simbench_of_laser(l), SIMBENCH_LASER, &done, err);
+    struct simbench *b = simbench_of_laser(l);
+    int rc = simbench_call(b, SIMBENCH_LASER, &done, err);
     if (rc >= 0)
-        snprintf(text, size, "simulated laser");
+        snprintf(text, size, "%s", b->laser_is ? b->laser_is : "simulated laser");
     return rc;
 }
 
@@ -329,9 +331,10 @@ static inline int simbench_detector_identify(struct detector *d, char *text, siz
                                              struct gon_error *err)
 {
     bool done;
-    int rc = simbench_call(simbench_of_detector(d), SIMBENCH_DETECTOR, &done, err);
+    struct simbench *b = simbench_of_detector(d);
+    int rc = simbench_call(b, SIMBENCH_DETECTOR, &done, err);
     if (rc >= 0)
-        snprintf(text, size, "simulated lock-in");
+        snprintf(text, size, "%s", b->detector_is ? b->detector_is : "simulated lock-in");
     return rc;
 }
 

@@ -53,6 +53,17 @@ static void links_are_taken_apart(void **state)
     assert_string_equal(l.place, "");
     assert_int_equal(link_parse("usbtmc:1313:8072:P00:1", LINK_TEXT, &l, NULL), 0);
     assert_string_equal(l.place, "P00:1");
+    assert_string_equal(link_serial_number(&l), "P00:1");
+    assert_int_equal(link_parse("serial:usb-0403:6001:A1:b?baud=9600", LINK_TEXT, &l, NULL), 0);
+    assert_true(l.kind == LINK_SERIAL && l.adapter && l.baud == 9600);
+    assert_true(l.vendor == 0x0403 && l.product == 0x6001);
+    assert_string_equal(l.place, "usb-0403:6001:A1:b");
+    assert_string_equal(link_serial_number(&l), "A1:b");
+    assert_int_equal(link_parse("modbus-rtu:usb-1A86:7523", LINK_MODBUS, &l, NULL), 0);
+    assert_true(l.adapter && l.vendor == 0x1a86 && l.product == 0x7523 && l.parity == 'E');
+    assert_string_equal(link_serial_number(&l), "");
+    assert_int_equal(link_parse("serial:/dev/serial/by-id/usb-FTDI", LINK_TEXT, &l, NULL), 0);
+    assert_false(l.adapter);
 }
 
 static void wrong_links_say_what_is_allowed(void **state)
@@ -75,6 +86,12 @@ static void wrong_links_say_what_is_allowed(void **state)
         {"serial:/dev/x?stop=3", LINK_TEXT, "allowed: 1, 2"},
         {"serial:/dev/x?speed=9600", LINK_TEXT, "unknown setting 'speed=9600'"},
         {"serial:/dev/x?", LINK_TEXT, "unknown setting ''"},
+        {"serial:usb-", LINK_TEXT, "after usb- comes VID:PID or VID:PID:SERIAL"},
+        {"serial:usb-FTDI_A1", LINK_TEXT, "four hexadecimal digits each"},
+        {"serial:usb-0403:600?baud=9600", LINK_TEXT, "four hexadecimal digits each"},
+        {"serial:usb-0403:6001:", LINK_TEXT, "VID:PID:SERIAL"},
+        {"serial:usb-0403:6001:A 1", LINK_TEXT, "VID:PID:SERIAL"},
+        {"modbus-rtu:usb-0403", LINK_MODBUS, "a path begins with /"},
         {"tcp:host", LINK_TEXT, "HOST:PORT"},
         {"tcp:host:", LINK_TEXT, "HOST:PORT"},
         {"tcp::4001", LINK_TEXT, "HOST:PORT"},

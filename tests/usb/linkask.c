@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: drivers base
-// Asks over a link what comes on standard input: linkask LINK. Each line is one of
+// Asks over a link what comes on standard input: linkask LINK [cr]. Commands and answers end with a
+// line feed, or with cr. Each line is one of
 //
 //   ask COMMAND       "ok ANSWER" or "error CODE TEXT"; then the milliseconds that it took
 //   send COMMAND      no answer is expected
@@ -25,12 +26,17 @@ static void on_alarm(int number)
     cancel_request(stop);
 }
 
-static const struct message_format format = {.end_out = "\n",
-                                             .end_in = "\n",
-                                             .timeout_ns = CLK_MS(500),
-                                             .quiet_ns = CLK_MS(100),
-                                             .sync_query = "*IDN?",
-                                             .sync_begins = ""};
+#define TIMEOUT_NS CLK_MS(500)
+
+static struct message_format format_of(const char *end)
+{
+    return (struct message_format){.end_out = end,
+                                   .end_in = end,
+                                   .timeout_ns = TIMEOUT_NS,
+                                   .quiet_ns = CLK_MS(100),
+                                   .sync_query = "*IDN?",
+                                   .sync_begins = ""};
+}
 
 // The system's clock, which notices how long it was not given its turn.
 struct clock {
@@ -74,7 +80,7 @@ static int ask_bytes(struct message *m, const char *command, char *answer, size_
 {
     static char bytes[65536];
     struct transport *t = message_transport(m);
-    const int64_t deadline_ns = clk_now_ns(clk_system()) + format.timeout_ns;
+    const int64_t deadline_ns = clk_now_ns(clk_system()) + TIMEOUT_NS;
     size_t have = 0;
     int rc = message_send(m, command, err);
     while (rc >= 0 && !transport_ended(t) && have < sizeof bytes) {
@@ -130,8 +136,8 @@ int main(int argc, char **argv)
     static const struct clk_ops ops = {clock_now_ns, clock_utc_ns, clock_sleep_until};
     const int64_t begun_ns = clk_now_ns(clk_system());
     struct clock c = {{&ops}, begun_ns, 0};
-    if (argc != 2) {
-        fprintf(stderr, "usage: linkask LINK\n");
+    if (argc < 2 || argc > 3 || (argc == 3 && strcmp(argv[2], "cr") != 0)) {
+        fprintf(stderr, "usage: linkask LINK [cr]\n");
         return 2;
     }
     stop = cancel_new();
@@ -140,6 +146,7 @@ int main(int argc, char **argv)
     say(rc, &err, "open", begun_ns);
     if (rc < 0)
         return 1;
+    const struct message_format format = format_of(argc == 3 ? "\r" : "\n");
     struct message *m = message_new(t, &format);
     while (m && fgets(line, sizeof line, stdin)) {
         line[strcspn(line, "\n")] = 0;
