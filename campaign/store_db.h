@@ -36,6 +36,10 @@ int store_db_prepare(struct store *s, const char *sql, sqlite3_stmt **ret_statem
                      struct gon_error *err);
 // Steps a statement that returns no row and finalizes it.
 int store_db_finish(struct store *s, sqlite3_stmt *statement, struct gon_error *err);
+void store_db_close(struct store *s);
+// Opens the file for writing, checked as a whole; what was open is closed.
+int store_db_reopen(struct store *s, struct gon_error *err);
+void store_wal_path(const struct store *s, char *path, size_t size);
 // Ready to write: open for writing, still at its path, mended after an error.
 int store_db_ready(struct store *s, struct gon_error *err);
 // Several statements as one commit: begin, then end with their result.

@@ -206,14 +206,16 @@ int store_read_readings(struct store *s, int sweep, struct store_reading **ret_r
 {
     sqlite3_stmt *q;
     struct store_reading *rows = NULL;
-    int rc =
-        store_db_prepare(s,
-                         "SELECT " STORE_READING_COLUMNS
-                         " FROM reading WHERE ?1 < 0 OR sweep = ?1 ORDER BY sweep, point, attempt",
-                         &q, err);
+    // Two statements: a condition for both would read the whole table for one sweep.
+    const char *sql = sweep < 0 ? "SELECT " STORE_READING_COLUMNS
+                                  " FROM reading ORDER BY sweep, point, attempt"
+                                : "SELECT " STORE_READING_COLUMNS
+                                  " FROM reading WHERE sweep = ?1 ORDER BY point, attempt";
+    int rc = store_db_prepare(s, sql, &q, err);
     if (rc < 0)
         return rc;
-    sqlite3_bind_int(q, 1, sweep);
+    if (sweep >= 0)
+        sqlite3_bind_int(q, 1, sweep);
     rc = read_rows(s, q, &rows, err);
     sqlite3_finalize(q);
     if (rc < 0)

@@ -718,6 +718,74 @@ static void a_moved_file_is_noticed_at_the_next_reading(void **state)
     store_close(s, NULL);
 }
 
+// What nobody but us can still see.
+static void a_removed_file_is_written_again(void **state)
+{
+    (void)state;
+    struct store_reading next = reading(1, 3, 1), *rows;
+    struct gon_error err;
+    store_close(created(), NULL);
+    // Pages in another order than in a copy, so that the old WAL would do harm to it.
+    tamper("CREATE TABLE m AS SELECT * FROM meta; DROP TABLE meta; CREATE TABLE meta"
+           " (key TEXT PRIMARY KEY, value) WITHOUT ROWID; INSERT INTO meta SELECT * FROM m;"
+           " DROP TABLE m");
+    struct store *s = opened(STORE_WRITE), *reader = opened(STORE_READ);
+    for (int point = 0; point < 3; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+    }
+    assert_int_equal(store_read_readings(reader, -1, &rows, NULL), 3); // so its WAL stays
+    free(rows);
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE); // the run must pause
+    assert_non_null(strstr(err.text, "it was written again, with all its 3 readings"));
+    append(s, &next);
+    next.point = 4;
+    append(s, &next);
+    store_close(reader, NULL);
+    assert_int_equal(store_close(s, NULL), 0);
+    assert_int_equal(fixture_files(&folder), 1);
+    s = opened(STORE_WRITE);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 5);
+    free(rows);
+    store_close(s, NULL);
+}
+
+static void a_replaced_file_is_kept_beside(void **state)
+{
+    (void)state;
+    const struct store_reading next = reading(1, 3, 1);
+    struct store_reading *rows;
+    struct gon_error err;
+    char rescued[160], text[8] = "";
+    struct store *s = created();
+    for (int point = 0; point < 3; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+    }
+    assert_int_equal(unlink(path), 0);
+    fixture_path(&folder, "0001-test.gonio-rescued", rescued, sizeof rescued);
+    int fd = open(path, O_CREAT | O_WRONLY, 0600);
+    assert_int_equal(write(fd, "other", 5), 5);
+    close(fd);
+    for (int again = 0; again < 2; again++) {
+        assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE);
+        assert_non_null(strstr(err.text, "what was measured is kept as"));
+        assert_non_null(strstr(err.text, rescued));
+    }
+    fd = open(path, O_RDONLY);
+    assert_int_equal(read(fd, text, 7), 5); // nobody touched it
+    close(fd);
+    assert_string_equal(text, "other");
+    assert_int_equal(unlink(path), 0); // taken away: it goes on
+    assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE);
+    append(s, &next);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 4);
+    free(rows);
+    store_close(s, NULL);
+    assert_int_equal(fixture_files(&folder), 1);
+}
+
 static void a_cut_file_is_noticed_at_the_next_reading(void **state)
 {
     (void)state;
@@ -1127,6 +1195,8 @@ int main(void)
         TEST(a_step_that_fails_changes_nothing),
         TEST(without_a_copy_nothing_is_changed),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
+        TEST(a_removed_file_is_written_again),
+        TEST(a_replaced_file_is_kept_beside),
         TEST(a_cut_file_is_noticed_at_the_next_reading),
         TEST(a_removed_wal_loses_nothing),
         TEST(a_cut_wal_is_noticed_at_the_next_reading),

@@ -24,6 +24,7 @@
 #include <dirent.h>
 #include <jansson.h>
 #include <math.h>
+#include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -281,6 +282,31 @@ static void profiles_are_kept_at_the_beginning_and_when_it_goes_on(void **state)
     assert_string_equal(texts, "sr830=one az=two az=three ");
     store_each_event(s, 0, list_event, events, NULL);
     assert_string_equal(events, "");
+    store_close(s, NULL);
+    free(run);
+}
+
+static void an_older_file_that_goes_on_says_what_became_of_it(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w);
+    struct store *s;
+    char events[2000] = "", wanted[700];
+    sqlite3 *db;
+    assert_int_equal(sqlite3_open(run->path, &db), SQLITE_OK);
+    assert_int_equal(
+        sqlite3_exec(db, "DROP TABLE profile; PRAGMA user_version = 2", NULL, NULL, NULL),
+        SQLITE_OK);
+    sqlite3_close(db);
+    run_material_free(open_run(w, run));
+    close_run(w, run->id, RUN_STOPPED);
+    assert_int_equal(store_open(run->path, STORE_READ, &s, NULL), 0);
+    assert_int_equal(store_each_event(s, 0, list_event, events, NULL), 1);
+    snprintf(wanted, sizeof wanted,
+             "notice: the file was of version 2 and is now of version 3; as it was it is kept as "
+             "%s.v2-backup\n",
+             run->path);
+    assert_string_equal(events, wanted);
     store_close(s, NULL);
     free(run);
 }
@@ -588,6 +614,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(a_campaign_goes_on_where_it_was_stopped),
         TEST(profiles_are_kept_at_the_beginning_and_when_it_goes_on),
+        TEST(an_older_file_that_goes_on_says_what_became_of_it),
         TEST(a_row_offered_again_is_accepted_only_when_it_is_the_same),
         TEST(a_wrong_campaign_is_complained_of_line_by_line),
         TEST(another_bench_is_refused),
