@@ -126,8 +126,8 @@ $(foreach t,$(SLOW_TESTS),$(eval $(call slow_rules,$(t))))
 check-slow: $(SLOW_TESTS:%=$(B)/tests/%)
 	$(Q)set -e; for t in $^; do $$t; done
 
-SHIM := $(B)/tests/libptycompat.so
-$(SHIM): tests/shim/ptycompat.c
+SHIMS := $(patsubst tests/shim/%.c,$(B)/tests/lib%.so,$(wildcard tests/shim/*.c))
+$(B)/tests/lib%.so: tests/shim/%.c
 	$(call say,LINK,$@)
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS) -std=c17 $(WARN) -O1 -g -fPIC -shared -o $@ $< -ldl
@@ -151,7 +151,7 @@ $(B)/obj/tests/usb/usbserver.o: CPPFLAGS += $(UMOCKDEV)
 unit: $(UNIT_TESTS:%=$(B)/tests/%)
 	$(Q)scripts/unit $(B)/tests $(UNIT_TESTS)
 
-system: all $(USB_PROGRAMS:%=$(B)/tests/%) $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
+system: all $(USB_PROGRAMS:%=$(B)/tests/%) $(SHIMS)
 	$(Q)GONIO_BUILD=$(abspath $(B)) scripts/system $(ARGS)
 
 # Parallel on its own unless the caller chose a number of jobs.

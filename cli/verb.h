@@ -30,6 +30,7 @@ extern const struct verb verb_status, verb_stop, verb_pause, verb_resume;
 extern const struct verb verb_list, verb_show;
 extern const struct verb verb_fit, verb_model;
 extern const struct verb verb_profile;
+extern const struct verb verb_laser;
 
 // Options into target, operands into operands: their count, or -1 after saying what was wrong.
 int verb_take(const struct verb *verb, int argc, char **argv, void *target, const char **operands,

@@ -296,6 +296,8 @@ static int measure(struct engine *e, const struct travel_pose *at)
         int rc = acquire_attempt(e->in, &e->acquire, &wish, e->ports->cancel, &r, &e->why);
         if (rc < 0)
             return rc;
+        if (e->lit && (rc = engine_heed_guard(e)) < 0)
+            return rc; // it went dark meanwhile: no reading
         e->attempt++;
         const struct store_reading row = row_of(e, &r, at);
         rc = store(e, &row);

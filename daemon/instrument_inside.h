@@ -5,6 +5,7 @@
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
 #include "drivers/backoff.h"
+#include "drivers/guard_link.h"
 
 struct bus;
 struct profile;
@@ -40,6 +41,8 @@ struct instrument {
     struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];
     struct profile *laser_profile, *detector_profile; // loaded when first needed; NULL before
+    struct guard_host host;   // no connect: there is no guard process
+    struct guard_link *guard; // NULL: not needed yet
     struct safety *safety;
     const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;

@@ -7,6 +7,7 @@
 #include "campaign/bench.h"
 #include "campaign/catalog.h"
 #include "daemon/deadline.h"
+#include "daemon/guardian.h"
 #include "daemon/hub.h"
 #include "daemon/listener.h"
 #include "daemon/loop.h"
@@ -58,6 +59,8 @@ struct daemon {
     struct loop *loop;
     struct listener *listener;
     struct simulator *simulator;
+    struct guardian *guardian;
+    struct guard_host guard;
     struct bench_config bench;
     char *bench_text;
     char socket[200], directory[4096];
@@ -267,6 +270,7 @@ static int open_hub(struct daemon *d, struct gon_error *err)
 {
     struct hub_options o = {
         .bench = &d->bench,
+        .guard = &d->guard,
         .bench_text = d->bench_text,
         .directory = d->directory,
         .simulator = d->simulator != NULL,
@@ -277,11 +281,23 @@ static int open_hub(struct daemon *d, struct gon_error *err)
         .ended = ended,
         .ctx = d,
     };
+    d->guard.brief = d->simulator != NULL;
     int rc = hub_new(d->loop, listener_fd(d->listener), &o, &d->hub, err);
     rc = rc < 0 ? rc : loop_signals(d->loop, signaled, d, err);
     if (rc == 0 && d->simulator)
         rc = loop_add(d->loop, simulator_fd(d->simulator), simulator_ended, d, err);
     return rc;
+}
+
+// Before there are other threads, and before anything could be switched on.
+static int open_guard(struct daemon *d, struct gon_error *err)
+{
+    int rc = guardian_start(d->socket, &d->guardian, err);
+    if (rc < 0)
+        return rc;
+    guardian_when_crashed(d->guardian);
+    d->guard = guardian_host(d->guardian);
+    return GON_OK;
 }
 
 // The socket first: a second daemon must be refused before it touches a device.
@@ -290,6 +306,7 @@ static int run(struct daemon *d)
     struct gon_error err;
     int rc = allow_descriptors(&err);
     rc = rc < 0 ? rc : open_socket(d, &err);
+    rc = rc < 0 ? rc : open_guard(d, &err);
     rc = rc < 0 ? rc : open_bench(d, &err);
     rc = rc < 0 ? rc : open_places(d, &err);
     if (rc == 0) {
@@ -306,6 +323,7 @@ static int run(struct daemon *d)
               stderr);
         d->status = 1;
     }
+    guardian_end(d->guardian);
     loop_free(d->loop);
     simulator_stop(d->simulator);
     listener_close(d->listener);

@@ -258,31 +258,35 @@ static void set_format(struct text_session *t, const struct profile *p)
     forget_sync(&t->session);
 }
 
-int session_open(const struct profile *p, const char *link, struct clk *clk,
-                 const struct cancel *cancel, struct session **ret_session, struct gon_error *err)
+int session_over(const struct profile *p, struct transport *transport,
+                 struct session **ret_session, struct gon_error *err)
 {
     static const struct session_ops ops = {
         text_ask,    text_send, text_send_blind, text_reopen,
         forget_sync, text_link, text_message,    text_free,
     };
-    struct transport *transport;
-    if (p->protocol != PROFILE_MESSAGE)
-        return gon_fail(err, GON_E_INPUT, "%s: profile %s is of an instrument on a Modbus bus",
-                        link, p->name);
-    int rc = transport_open(link, clk, cancel, &transport, err);
-    if (rc < 0)
-        return rc;
     struct text_session *t = calloc(1, sizeof *t);
     if (!t) {
         transport_close(transport);
-        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
+        return gon_fail(err, GON_E_SYSTEM, "session: out of memory");
     }
     session_init(&t->session, &ops, p);
     set_format(t, p);
     if (!(t->m = message_new(transport, &t->format))) {
         free(t);
-        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
+        return gon_fail(err, GON_E_SYSTEM, "session: out of memory");
     }
     *ret_session = &t->session;
     return 0;
+}
+
+int session_open(const struct profile *p, const char *link, struct clk *clk,
+                 const struct cancel *cancel, struct session **ret_session, struct gon_error *err)
+{
+    struct transport *transport;
+    if (p->protocol != PROFILE_MESSAGE)
+        return gon_fail(err, GON_E_INPUT, "%s: profile %s is of an instrument on a Modbus bus",
+                        link, p->name);
+    int rc = transport_open(link, clk, cancel, &transport, err);
+    return rc < 0 ? rc : session_over(p, transport, ret_session, err);
 }

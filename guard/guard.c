@@ -73,10 +73,13 @@ static void fire(struct guard *g, struct guard_acts *acts, int64_t now_ns)
 static void begin(struct guard *g, struct guard_acts *acts, int64_t now_ns, enum guard_why why)
 {
     g->status.why = (uint8_t)why;
-    if (!g->open)
-        go_to(g, GUARD_STEP_OPEN, now_ns);
-    else if (g->status.phase != GUARD_SAFING) // else it goes on
+    if (g->open && g->status.phase == GUARD_SAFING)
+        return; // it goes on
+    g->status.seen = GUARD_SEEN_NOTHING;
+    if (g->open)
         fire(g, acts, now_ns);
+    else
+        go_to(g, GUARD_STEP_OPEN, now_ns);
 }
 
 static void confirmed(struct guard *g, struct guard_acts *acts)
@@ -184,10 +187,9 @@ static void take_step(struct guard *g, struct guard_acts *acts, int64_t now_ns)
 static void take_record(struct guard *g, struct guard_acts *acts, int64_t now_ns, const char *bytes,
                         size_t size)
 {
-    const struct guard_record *r = &g->record;
-    const bool same = strncmp(bytes, r->link, sizeof r->link) == 0;
+    const bool same = strncmp(bytes, g->record.link, sizeof g->record.link) == 0;
     const bool safe = g->status.phase == GUARD_EMPTY || g->status.phase == GUARD_DARK;
-    if (size != sizeof *r || (!same && !safe)) {
+    if (size != sizeof g->record || (!same && !safe)) {
         answer(g, acts, GON_E_REFUSED,
                same ? "goniod and gonio-guard are of different versions"
                     : "the laser before is not off yet");

@@ -127,9 +127,8 @@ static void hear_laser(struct shell *s)
     char bytes[GUARD_DATA];
     struct gon_error err = {.text = ""};
     const int n = transport_read(s->transport, bytes, sizeof bytes, 0, &err);
-    struct guard_event e = {GUARD_ON_BYTES, bytes, (size_t)n, false, n, err.text};
-    if (n < 0)
-        e.kind = GUARD_ON_DONE;
+    struct guard_event e = {
+        n < 0 ? GUARD_ON_DONE : GUARD_ON_BYTES, bytes, (size_t)n, false, n, err.text};
     if (n != GON_E_LINK) // there was nothing after all
         step(s, &e);
 }
@@ -143,15 +142,14 @@ static void serve(struct shell *s)
     s->fds[AT_LASER] = (struct pollfd){streams ? transport_fd(s->transport) : -1, POLLIN, 0};
     if (poll(s->fds, FDS, wait_ms) < 0)
         return;
-    const struct pollfd *f = s->fds;
     struct signalfd_siginfo info;
-    if (f[AT_CLIENT].revents)
+    if (s->fds[AT_CLIENT].revents)
         hear_client(s);
-    if (f[AT_SIGNAL].revents && read(f[AT_SIGNAL].fd, &info, sizeof info) > 0)
+    if (s->fds[AT_SIGNAL].revents && read(s->fds[AT_SIGNAL].fd, &info, sizeof info) > 0)
         step(s, &(struct guard_event){.kind = GUARD_ON_SIGNAL});
-    if (f[AT_STOP].revents)
+    if (s->fds[AT_STOP].revents)
         hear_stop(s);
-    if (f[AT_LASER].revents)
+    if (s->fds[AT_LASER].revents)
         hear_laser(s);
     step(s, &(struct guard_event){.kind = GUARD_ON_TIME});
 }
