@@ -3,9 +3,9 @@
 
 How late OFF comes is the time from the signal to the first OFF on the wire, by goniosim's record of what it heard
 (CLOCK_MONOTONIC, as ours). A machine that is busy is late itself: a second thread measures that meanwhile, as the most
-that a sleep of 1 ms took too long, and that much is allowed on top. So the bounds are those of the design, 50 ms after
-a death and 550 ms after a hang, for every single one, plus what the machine itself was late (at most 1 s).
-GONIO_GUARD_DEATHS says how often goniod dies each way: 20, and 1,000 for the long run."""
+that a sleep of 1 ms took too long. The guard and the simulator wake up once each on that way, so that twice as much is
+allowed on top, at most 1 s. The bounds are those of the design, 50 ms after a death and 550 ms after a hang, for every
+single one. GONIO_GUARD_DEATHS says how often goniod dies each way: 20, and 250 (1,000 in all) for the long run."""
 import ctypes
 import os
 import pathlib
@@ -16,7 +16,7 @@ import time
 
 import pytest
 
-from conftest import BUILD, Daemon, gonio, wait_for
+from conftest import BUILD, gonio, wait_for
 
 PLAN = """\
 campaign: {
@@ -68,26 +68,6 @@ def sim(start_sim):
     return start_sim("--fast", "--seed", "3", "--set", "laser.warmup_s=0.05", "--set", "laser.temperatures_s=0")
 
 
-def stop_socket(daemon):
-    return daemon.runtime / "goniod-guard.sock"
-
-
-def guard_pid(daemon):
-    """Of the guard behind the STOP socket, without connecting to it, which would mean OFF."""
-    inode = {line.split()[6] for line in pathlib.Path("/proc/net/unix").read_text().splitlines()[1:]
-             if line.endswith(str(stop_socket(daemon)))}
-    for process in pathlib.Path("/proc").glob("[0-9]*"):
-        try:
-            if (process / "comm").read_text() != "gonio-guard\n":
-                continue
-            links = {os.readlink(fd) for fd in (process / "fd").iterdir()}
-        except OSError:
-            continue
-        if any(f"socket:[{i}]" in links for i in inode):
-            return int(process.name)
-    return None
-
-
 def alive(pid):
     try:
         return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
@@ -110,9 +90,9 @@ def emits(sim):
     return sim.control(do="state")["laser"]["emission"]
 
 
-def measuring(sim, tmp_path, run=None, env=None):
+def measuring(sim, start_daemon, run=None, env=None):
     """A daemon in the middle of a run, with the light on; the run's number."""
-    daemon = Daemon(tmp_path, "--config", sim.folder / "goniod.cfg", env=env)
+    daemon = start_daemon("--config", sim.folder / "goniod.cfg", env=env)
     if run is None:
         run = daemon.submit(PLAN, "guarded.cfg")["run"]
         events = daemon.follow(0)
@@ -142,12 +122,12 @@ DEATH = {"SIGKILL": signal.SIGKILL, "SIGSEGV": signal.SIGSEGV, "SIGABRT": signal
 
 
 @pytest.mark.parametrize("way", DEATH)
-def test_off_follows_every_death_within_50_ms(sim, tmp_path, metronome, way):
+def test_off_follows_every_death_within_50_ms(sim, start_daemon, metronome, way):
     random_ = random.Random(SEED)
     print("seed", SEED)
     run, delays, excess = None, [], []
     for i in range(DEATHS):
-        daemon, run = measuring(sim, tmp_path, run, MISHAP)
+        daemon, run = measuring(sim, start_daemon, run, MISHAP)
         time.sleep(random_.random() * 0.15)  # also between a question and its answer
         metronome.begin()
         if i % 4 == 3 and os.geteuid() == 0:
@@ -155,20 +135,20 @@ def test_off_follows_every_death_within_50_ms(sim, tmp_path, metronome, way):
         died_ns = time.monotonic_ns()
         os.kill(daemon.pid, DEATH[way])
         delays.append(first_off_s(sim, died_ns))
-        excess.append(delays[-1] - min(metronome.worst_s, 1.0))
+        excess.append(delays[-1] - min(2 * metronome.worst_s, 1.0))
         daemon.process.wait(10)
         wait_for(lambda: not emits(sim), 5)
     say(way, delays)
     assert max(excess) < 0.050
-    wait_for(lambda: guard_pid(daemon) is None)  # it was read back: nothing is left to do
+    wait_for(lambda: daemon.guard_pid() is None)  # it was read back: nothing is left to do
 
 
 @pytest.mark.parametrize("way", ["SIGSTOP", "loop"])
-def test_off_follows_every_hang_within_550_ms(sim, tmp_path, metronome, way):
+def test_off_follows_every_hang_within_550_ms(sim, start_daemon, metronome, way):
     """Stopped as a whole; the instrument's thread alone in an endless loop, while the main thread lives."""
     run, delays, excess = None, [], []
     for _ in range(max(1, DEATHS // 5)):
-        daemon, run = measuring(sim, tmp_path, run, MISHAP)
+        daemon, run = measuring(sim, start_daemon, run, MISHAP)
         metronome.begin()
         hung_ns = time.monotonic_ns()
         if way == "SIGSTOP":
@@ -176,7 +156,7 @@ def test_off_follows_every_hang_within_550_ms(sim, tmp_path, metronome, way):
         else:
             hang_instrument(daemon.pid)
         delays.append(first_off_s(sim, hung_ns))
-        excess.append(delays[-1] - min(metronome.worst_s, 1.0))
+        excess.append(delays[-1] - min(2 * metronome.worst_s, 1.0))
         wait_for(lambda: not emits(sim), 5)
         if way == "loop":
             assert daemon.status()["state"] == "running"  # the main thread knows nothing yet
@@ -195,7 +175,7 @@ def hang_instrument(pid):
     raise AssertionError("no thread 'instrument'")
 
 
-def test_a_daemon_that_was_stopped_goes_on_and_pauses(sim, start_daemon, tmp_path):
+def test_a_daemon_that_was_stopped_goes_on_and_pauses(sim, start_daemon):
     daemon = start_daemon("--config", sim.folder / "goniod.cfg")
     run = daemon.submit(PLAN, "guarded.cfg")["run"]
     events = daemon.follow(0)
@@ -264,7 +244,7 @@ def test_a_guard_that_dies_is_replaced_and_the_run_pauses(sim, start_daemon):
     run = daemon.submit(PLAN, "guarded.cfg")["run"]
     events = daemon.follow(0)
     events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
-    pid = guard_pid(daemon)
+    pid = daemon.guard_pid()
     died_ns = time.monotonic_ns()
     os.kill(pid, signal.SIGKILL)
     delay_s = first_off_s(sim, died_ns)
@@ -272,7 +252,7 @@ def test_a_guard_that_dies_is_replaced_and_the_run_pauses(sim, start_daemon):
     paused = events.until_state(run, "paused")
     assert "guard process" in paused["text"], paused
     wait_for(lambda: not emits(sim))
-    assert guard_pid(daemon) not in (None, pid)
+    assert daemon.guard_pid() not in (None, pid)
     assert daemon.gonio("resume", "--detach").returncode == 0
     events.until(lambda e: e["event"] == "reading")
 
@@ -282,15 +262,15 @@ def test_a_signal_to_the_guard_means_off(sim, start_daemon):
     run = daemon.submit(PLAN, "guarded.cfg")["run"]
     events = daemon.follow(0)
     events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
-    os.kill(guard_pid(daemon), signal.SIGTERM)
+    os.kill(daemon.guard_pid(), signal.SIGTERM)
     wait_for(lambda: not emits(sim))
     paused = events.until_state(run, "paused")
     assert "told to end" in paused["text"], paused
 
 
-def test_off_waits_for_a_laser_that_was_unplugged_when_goniod_died(sim, tmp_path):
-    daemon, _ = measuring(sim, tmp_path)
-    pid = guard_pid(daemon)
+def test_off_waits_for_a_laser_that_was_unplugged_when_goniod_died(sim, start_daemon):
+    daemon, _ = measuring(sim, start_daemon)
+    pid = daemon.guard_pid()
     sim.control(do="unplug", wire="laser")
     daemon.end(signal.SIGKILL)
     assert emits(sim)
@@ -301,33 +281,31 @@ def test_off_waits_for_a_laser_that_was_unplugged_when_goniod_died(sim, tmp_path
     wait_for(lambda: not alive(pid))
 
 
-def test_the_next_goniod_takes_over_from_a_guard_that_cannot_end(sim, tmp_path):
-    daemon, _ = measuring(sim, tmp_path)
-    pid = guard_pid(daemon)
+def test_the_next_goniod_takes_over_from_a_guard_that_cannot_end(sim, start_daemon):
+    daemon, _ = measuring(sim, start_daemon)
+    pid = daemon.guard_pid()
     sim.control(do="set", ignore_off=True)
     daemon.end(signal.SIGKILL)
     time.sleep(0.7)
     assert alive(pid)
     sim.control(do="set", ignore_off=False)
     begun_ns = time.monotonic_ns()
-    again = Daemon(tmp_path, "--config", sim.folder / "goniod.cfg")
-    try:
-        assert not alive(pid) and not emits(sim)
-        heard = [h["text"] for h in sim.control(do="heard")["heard"] if h["t_ns"] >= begun_ns]
-        assert "l0" in heard
-    finally:
-        assert again.end() == 0
+    again = start_daemon("--config", sim.folder / "goniod.cfg")
+    assert not alive(pid) and not emits(sim)
+    heard = [h["text"] for h in sim.control(do="heard")["heard"] if h["t_ns"] >= begun_ns]
+    assert "l0" in heard
+    assert again.end() == 0
 
 
-def test_what_is_left_of_a_command_does_not_swallow_the_first_off(sim, tmp_path):
+def test_what_is_left_of_a_command_does_not_swallow_the_first_off(sim, start_daemon):
     """Start-up: OFF comes first, and ends what somebody else began to say."""
     half_a_command(sim)
     begun_ns = time.monotonic_ns()
-    daemon = Daemon(tmp_path, "--config", sim.folder / "goniod.cfg")
+    daemon = start_daemon("--config", sim.folder / "goniod.cfg")
     assert daemon.end() == 0
     heard = [h["text"] for h in sim.control(do="heard")["heard"] if h["t_ns"] >= begun_ns]
     assert heard[0] == "p 0.0" and heard[1] == "l0", heard[:4]
 
 
 def test_the_stop_socket_is_for_user_and_group_only(daemon):
-    assert stop_socket(daemon).stat().st_mode & 0o777 == 0o660
+    assert daemon.stop_socket().stat().st_mode & 0o777 == 0o660

@@ -4,12 +4,14 @@ gonio's own link (tests/usb/linkask) and by pyvisa-py, which knows nothing of go
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
-from conftest import BUILD, Program
+from conftest import BUILD, Program, wait_for
 
 METER = "usbtmc:1313:8072"
 IDENTITY = "Thorlabs,PM100USB,P0000001,1.4.0"
@@ -29,8 +31,8 @@ def preload(program):
 class Dialogue(Program):
     """A program that answers each line with a line."""
 
-    def __init__(self, argv, log, env):
-        super().__init__(argv, log, env={"LD_PRELOAD": preload(argv[0]), **env}, stdin=subprocess.PIPE)
+    def __init__(self, argv, log, env, cwd=None):
+        super().__init__(argv, log, env={"LD_PRELOAD": preload(argv[0]), **env}, stdin=subprocess.PIPE, cwd=cwd)
 
     def say(self, line):
         self.process.stdin.write(line + "\n")
@@ -74,6 +76,15 @@ class Usb:
         else:
             assert client.process.wait(10) == 1
         return client, said
+
+    def guarded(self):
+        """A client whose device is held by a guard process."""
+        client = Dialogue([BUILD / "tests/linkask", METER, BUILD / "gonio-guard"], self.folder / "linkask.log", self.env,
+                          self.folder)
+        self.clients.append(client)
+        said = client.hear()
+        assert said.startswith("ok open"), said
+        return client
 
     def open(self, text=METER):
         client, said = self.link(text)
@@ -293,3 +304,53 @@ def test_an_independent_peer_understands_the_device(usb):
                           capture_output=True, text=True, check=False)
     assert peer.returncode == 0, peer.stderr
     assert peer.stdout.split("\n")[:-1] == [IDENTITY, "633.0", "1", "2", "3", "5000"]
+
+
+def wavelength_nm(client):
+    return round(float(re.match(r"ok (\S+) \(", client.ask("ask SENS:CORR:WAV?")).group(1)))
+
+
+def reads_1234(usb):
+    """What the meter is set to, by a client of its own, as soon as the guard has let it go."""
+    client, said = usb.link()
+    return said.startswith("ok open") and wavelength_nm(client) == 1234
+
+
+def test_over_usb_a_guard_lets_questions_and_answers_pass(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert wavelength_nm(meter) == 1234  # its first bytes were OFF
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+    said = meter.ask("bytes LONG? 5000")
+    text = bytes(ord("a") + i % 26 for i in range(4999)) + b"\n"
+    assert said.startswith(f"ok 5000 {crc32c(text):08x} "), said
+    assert meter.ask("ask NONSENSE?").startswith("error")
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+
+
+def test_over_usb_a_lease_that_runs_out_means_off(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    for _ in range(10):
+        assert meter.ask("renew").startswith("ok")
+        time.sleep(0.1)
+    assert wavelength_nm(meter) == 1550
+    time.sleep(1.0)
+    refused = meter.ask("ask SENS:CORR:WAV?")
+    assert refused.startswith("error refused") and "0.5 s" in refused, refused
+    assert meter.ask("off").startswith("ok")
+    assert wavelength_nm(meter) == 1234
+
+
+def test_over_usb_a_death_means_off(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    assert wavelength_nm(meter) == 1550
+    usb.clients.remove(meter)
+    meter.end(signal.SIGKILL)
+    wait_for(lambda: reads_1234(usb))

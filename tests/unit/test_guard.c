@@ -408,9 +408,11 @@ static void the_client_gone_means_off_and_then_the_end(void **state)
     (void)state;
     struct bench b;
     begin_lit(&b);
+    const int64_t gone_ms = b.t_ms;
     comes_of_it(&b, GUARD_ON_GONE, 0);
     writes(&b, OFF);
     confirms(&b);
+    assert_int_equal(b.t_ms, gone_ms + 120 + 120 + 100); // nothing was owed
     does(&b, GUARD_END);
 }
 
@@ -606,6 +608,7 @@ static void an_expression_that_cannot_be_read_never_says_off(void **state)
     (void)state;
     struct bench b;
     begin_lit(&b);
+    b.g.record.asks = 1;
     strcpy(b.g.record.ask[0].off, "(");
     comes_of_it(&b, GUARD_ON_GONE, 0);
     writes(&b, OFF);
@@ -713,7 +716,7 @@ static void over_usb_answers_are_fetched(void **state)
     writes(&b, LIGHT);
     assert_true(does(&b, GUARD_READ)->wait_ns == 150 * MS);
     happens(&b, (struct guard_event){GUARD_ON_BYTES, "0", 1, false, 0, ""});
-    comes_of_it(&b, GUARD_ON_DONE, GON_E_LINK);                             // nobody waits for that
+    comes_of_it(&b, GUARD_ON_DONE, GON_E_LINK); // nobody waits for that
     happens(&b, (struct guard_event){GUARD_ON_BYTES, "10", 2, true, 0, ""}); // "010" in two parts
     assert_int_equal(status(&b).seen, GUARD_SEEN_ON);
     happens(&b, (struct guard_event){GUARD_ON_BYTES, "0", 1, true, 0, ""}); // ends where it says so

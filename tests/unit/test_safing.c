@@ -180,6 +180,17 @@ static void what_the_guard_cannot_judge_is_refused(void **state)
     refused("emission = mode", "compare two values");
     refused("emission = 2", "no answer can mean off");
     refused("emission = 0 and fault = 0", "which no question of off_asks brings");
+
+    struct profile *p = malloc(sizeof *p);
+    struct guard_record r;
+    struct gon_error err = {0};
+    *p = *profiles_get("coherent-obis");
+    strcpy(p->laser.is_off, "status has 0x08 and emission = OFF");
+    assert_int_equal(safing_of(p, "serial:/dev/x", &r, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "missing bits"));
+    strcpy(p->laser.is_off, "not status.emission and status >= 8 and emission = OFF");
+    assert_int_equal(safing_of(p, "serial:/dev/x", &r, &err), GON_E_INPUT);
+    free(p);
 }
 
 static void a_laser_that_nothing_switches_on_cannot_be_watched(void **state)
