@@ -24,7 +24,7 @@ struct guard_link {
     bool answered;      // the call that is waited for
     struct guard_no no; // its answer; code 0: done
     uint32_t asked;     // the number of the last X
-    int64_t renewed_ns;
+    int64_t renewed_ns, ready_ns;
     size_t have;
     bool ended;
     char heard[HEARD];
@@ -46,6 +46,11 @@ void guard_link_free(struct guard_link *g)
     free(g);
 }
 
+int64_t guard_link_ready_ns(const struct guard_link *g)
+{
+    return g->ready_ns;
+}
+
 int guard_link_fd(const struct guard_link *g)
 {
     return g->fd;
@@ -57,6 +62,7 @@ static void hear(struct guard_link *g, const char *bytes, size_t size)
 {
     switch (bytes[0]) {
     case 's':
+        g->ready_ns = clk_now_ns(g->clk) + g->record.gap_ns; // its last question was answered
         memcpy(&g->status, bytes + 1, size - 1 < sizeof g->status ? size - 1 : sizeof g->status);
         break;
     case 'b':

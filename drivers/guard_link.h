@@ -45,7 +45,9 @@ int guard_link_call(struct guard_link *g, char kind, const void *bytes, size_t s
                     int64_t wait_ns, struct gon_error *err);
 size_t guard_link_take(struct guard_link *g, void *bytes, size_t size); // what the laser said
 bool guard_link_ended(const struct guard_link *g);                      // that was all of a message
-int guard_link_fd(const struct guard_link *g);                          // -1: the guard is gone
+int64_t
+guard_link_ready_ns(const struct guard_link *g); // the laser's gap after the guard's own talk
+int guard_link_fd(const struct guard_link *g);   // -1: the guard is gone
 
 // A transport over it, as transport_open over the record's link; g is borrowed. Opens nothing yet
 // but what guard_link_open does.

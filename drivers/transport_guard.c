@@ -53,6 +53,7 @@ static int guard_write(struct transport *t, const void *data, size_t size, int64
         return gon_fail(err, GON_E_INPUT, "%s: %zu bytes are more than the guard lets pass",
                         t->text, size);
     int rc = need(t, err);
+    clk_sleep_until(t->clk, guard_link_ready_ns(t->guard), NULL);
     if (rc == 0)
         rc = guard_link_call(t->guard, 'D', data, size, left_ns(t, deadline_ns) + ANSWER_NS, err);
     if (rc == 0)
