@@ -445,6 +445,7 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
     instrument_obey(instrument, ports->cancel);
+    instrument_permit(instrument, false); // what the guard did before is past
     engine_enter(&e, RUN_PREPARING, NULL);
     const enum run_state ended = finish(&e, run_points(&e), err);
     instrument_obey(instrument, NULL);

@@ -156,6 +156,7 @@ int engine_pause_run(struct engine *e)
         rc = wait_for_operator(e);
         e->returns = 0;
     }
+    instrument_permit(e->in, false); // what the guard did meanwhile is past
     const bool returned = by_itself && !e->wanted; // and nobody took the pause over
     e->wanted = false;
     if (rc >= 0)

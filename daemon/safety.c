@@ -75,7 +75,8 @@ int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_erro
 void safety_permit(struct safety *s, bool running)
 {
     s->running = running;
-    s->alarm = (struct gon_error){0};
+    if (!running)
+        s->alarm = (struct gon_error){0};
 }
 
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err)
@@ -170,8 +171,8 @@ static void keep_alive(struct safety *s)
     talked(s, s->laser->ops->keep_alive(s->laser, NULL));
 }
 
-// The guard's lease goes on also while the laser is being talked to. An alarm is kept: whoever
-// switches off after it makes the guard forget.
+// The guard's lease goes on also while the laser is being talked to. An alarm is kept here: whoever
+// switches off after it makes the guard forget. While nothing runs that is due at the next look.
 static void mind_guard(struct safety *s)
 {
     struct gon_error why;
@@ -179,8 +180,12 @@ static void mind_guard(struct safety *s)
         return;
     if (s->emission && !s->pending && !s->alarm.code)
         guard_link_renew(s->guard);
-    if (!s->alarm.code && guard_link_watch(s->guard, &why) < 0)
+    if (guard_link_watch(s->guard, &why) == 0)
+        return;
+    if (!s->alarm.code)
         s->alarm = why;
+    if (!s->running)
+        s->pending = true;
 }
 
 int safety_alarm(const struct safety *s, struct gon_error *err)

@@ -12,10 +12,11 @@
 //    due, once for each stop; whoever ends the run repeats it until it is read back;
 //  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms.
 //    With a guard process (safety_guard) that renews the lease: 500 ms of silence, or our death,
-//    and the guard switches off. Then and when the guard itself is gone, the alarm stands
-//    (safety_alarm), off is due, and on is refused until the permission was taken back.
-//    A laser with a lease of its own (keep_alive) is told in the same tick, and no longer once off
-//    was sent: it goes off by itself when this thread hangs.
+//    and the guard switches off. Then, after gonio laser off, and when the guard itself is gone,
+//    the alarm stands (safety_alarm), off is due, and on is refused until the permission is taken
+//    back (again); without permission off is pending. A laser with a lease of its own (keep_alive)
+//    is told in the same tick, and no longer once off was sent: it goes off by itself when this
+//    thread hangs.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -54,8 +55,8 @@ int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error
 // One try at the link, then safety_begin.
 int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_error *err);
 
-void safety_permit(struct safety *s,
-                   bool running); // a run begins or ends; ending sends nothing itself
+// A run begins or ends; ending sends nothing itself, and forgets the alarm.
+void safety_permit(struct safety *s, bool running);
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err);
 
 // GON_E_REFUSED: no running campaign, interlock open, key; GON_E_DEVICE: fault. Accepted is not
@@ -68,7 +69,7 @@ void safety_obey(struct safety *s, const struct cancel *stop);
 // Renews the lease; costs nothing while emission is off. True when off is due: a stop was asked for
 // with the light on, or the guard raised the alarm, and the laser is not being talked to.
 bool safety_tick(struct safety *s);
-// What the guard did without being asked, or that it is gone, since the permission was given: 0, or
+// What the guard did without being asked, or that it is gone, since the last end of a run: 0, or
 // GON_E_REFUSED or GON_E_DEVICE.
 int safety_alarm(const struct safety *s, struct gon_error *err);
 

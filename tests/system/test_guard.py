@@ -7,6 +7,7 @@ that a sleep of 1 ms took too long. The guard and the simulator wake up once eac
 allowed on top, at most 1 s. The bounds are those of the design, 50 ms after a death and 550 ms after a hang, for every
 single one. GONIO_GUARD_DEATHS says how often goniod dies each way: 20, and 250 (1,000 in all) for the long run."""
 import ctypes
+import json
 import os
 import pathlib
 import random
@@ -204,6 +205,30 @@ def test_laser_off_switches_off_a_run_which_pauses(sim, start_daemon):
     assert "gonio laser off" in paused["text"], paused
 
 
+def test_laser_off_of_an_idle_goniod_leaves_it_ready_for_a_run(sim, start_daemon):
+    daemon = start_daemon("--config", sim.folder / "goniod.cfg")
+    assert daemon.gonio("laser", "off").returncode == 0
+    wait_for(lambda: "ok" == next(d for d in daemon.status()["devices"] if d["name"] == "laser")["link"]
+             and "unconfirmed" not in daemon.gonio("status").stdout)
+    time.sleep(2.5)  # it looks once a second, and asks for OFF itself
+    daemon.submit(PLAN, "guarded.cfg")
+    events = daemon.follow(0)
+    e = events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1 or e.get("state") == "paused")
+    assert e["event"] == "reading", e
+
+
+def test_laser_off_holds_a_run_that_is_only_preparing(start_sim, start_daemon):
+    sim = start_sim("--seed", "3")  # homing takes its time
+    daemon = start_daemon("--config", sim.folder / "goniod.cfg")
+    run = daemon.submit(PLAN, "guarded.cfg")["run"]
+    events = daemon.follow(0)
+    wait_for(lambda: any(a["moving"] for a in sim.control(do="state")["axes"].values()))
+    assert daemon.gonio("laser", "off").returncode == 0
+    paused = events.until_state(run, "paused")
+    assert "gonio laser off" in paused["text"], paused
+    assert sim.control(do="state")["laser"]["ons"] == 0
+
+
 def test_laser_off_works_while_goniod_hangs(sim, start_daemon):
     daemon = start_daemon("--config", sim.folder / "goniod.cfg")
     daemon.submit(PLAN, "guarded.cfg")
@@ -255,6 +280,19 @@ def test_a_guard_that_dies_is_replaced_and_the_run_pauses(sim, start_daemon):
     assert daemon.guard_pid() not in (None, pid)
     assert daemon.gonio("resume", "--detach").returncode == 0
     events.until(lambda e: e["event"] == "reading")
+
+
+def test_when_both_die_the_service_manager_can_switch_off(sim, start_daemon):
+    daemon, _ = measuring(sim, start_daemon)
+    os.kill(daemon.guard_pid(), signal.SIGSTOP)  # or it would be quicker than the second kill
+    guard = daemon.guard_pid()
+    daemon.end(signal.SIGKILL)
+    os.kill(guard, signal.SIGKILL)
+    wait_for(lambda: not alive(guard))
+    assert emits(sim)
+    done = daemon.gonio("laser", "off", "--bench", sim.folder / "goniod.cfg", "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["laser_off"] is True, done
+    assert not emits(sim)
 
 
 def test_a_signal_to_the_guard_means_off(sim, start_daemon):
