@@ -26,13 +26,14 @@ static void guard_free(struct transport *t)
     (void)t; // whoever made the link frees it
 }
 
-static int settle(struct transport *t, int rc, struct gon_error *err)
+// After each call to the guard; the error's text is there already.
+static int settle(struct transport *t, int rc)
 {
-    if (rc != GON_E_GONE)
-        return rc;
-    t->shut = true;
-    t->stats.errors[LINK_HUNG_UP]++;
-    return gon_fail(err, rc, "%s: unplugged (hung up), or its guard is gone", t->text);
+    if (rc == GON_E_GONE) {
+        t->stats.errors[LINK_HUNG_UP] += !t->shut;
+        t->shut = true;
+    }
+    return rc;
 }
 
 static int need(const struct transport *t, struct gon_error *err)
@@ -58,7 +59,7 @@ static int guard_write(struct transport *t, const void *data, size_t size, int64
         rc = guard_link_call(t->guard, 'D', data, size, left_ns(t, deadline_ns) + ANSWER_NS, err);
     if (rc == 0)
         t->stats.bytes_out += size;
-    return settle(t, rc, err);
+    return settle(t, rc);
 }
 
 // Bytes of a stream come by themselves.
@@ -69,7 +70,7 @@ static int await(struct transport *t, int64_t deadline_ns, struct gon_error *err
     if (rc == GON_E_CANCELED)
         return gon_fail(err, rc, "%s: stopped while waiting", t->text);
     if (guard_link_watch(t->guard, &why) == GON_E_DEVICE)
-        return settle(t, GON_E_GONE, err);
+        return settle(t, gon_fail(err, GON_E_GONE, "%s", why.text));
     return 0;
 }
 
@@ -89,7 +90,7 @@ static int guard_read(struct transport *t, void *data, size_t size, int64_t dead
             rc = await(t, deadline_ns, err);
     }
     if (rc < 0)
-        return settle(t, rc, err);
+        return settle(t, rc);
     t->ended = transport_framed(t) && guard_link_ended(t->guard);
     t->stats.bytes_in += n;
     return (int)n;
@@ -101,10 +102,8 @@ static int guard_drain(struct transport *t, int64_t quiet_ns, struct gon_error *
     const int64_t give_up_ns = clk_now_ns(t->clk) + quiet_ns + TRANSPORT_BABBLE_NS;
     int rc = need(t, err), dropped = 0;
     if (rc == 0 && transport_framed(t))
-        return settle(t,
-                      guard_link_call(t->guard, 'C', &quiet_ns, sizeof quiet_ns,
-                                      quiet_ns + TRANSPORT_BABBLE_NS + CLK_S(5), err),
-                      err);
+        return settle(t, guard_link_call(t->guard, 'C', &quiet_ns, sizeof quiet_ns,
+                                         quiet_ns + TRANSPORT_BABBLE_NS + CLK_S(5), err));
     for (int64_t quiet_since_ns = clk_now_ns(t->clk); rc == 0;) {
         const size_t n = guard_link_take(t->guard, waste, sizeof waste);
         const int64_t now_ns = clk_now_ns(t->clk);
