@@ -3,7 +3,7 @@
 #   make                 the four programs             make demo     a whole campaign on the simulated bench
 #   make check           unit and system tests         make layers   who may include whom
 #   make bench           what things cost, as a table and in build/bench.json
-#   make check-slow      statistics of the fit's intervals (minutes)
+#   make check-slow      statistics of the fit's intervals, and 1,000 deaths of goniod
 #   make coverage-guard  every branch of what decides that a laser goes off
 #   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
 #
@@ -54,7 +54,7 @@ Q := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
 .DEFAULT_GOAL := all
-.PHONY: all bench check check-slow coverage-guard unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
+.PHONY: all bench check check-slow coverage-guard check-deaths unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
 all: $(PROGRAMS:%=$(B)/%) build/share/gonio/profiles $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
 
 # --- objects, one archive a layer, programs -------------------------------------------------------
@@ -125,6 +125,11 @@ $(foreach t,$(SLOW_TESTS),$(eval $(call slow_rules,$(t))))
 
 check-slow: $(SLOW_TESTS:%=$(B)/tests/%)
 	$(Q)set -e; for t in $^; do $$t; done
+	$(Q)$(MAKE) --no-print-directory check-deaths
+
+# goniod dies 1,000 times with the laser on, 250 times each way (an hour or so).
+check-deaths: all $(B)/tests/libmishap.so
+	$(Q)GONIO_BUILD=$(abspath $(B)) GONIO_JOBS=4 GONIO_GUARD_DEATHS=250 scripts/system -rP -k off_follows
 
 SHIMS := $(patsubst tests/shim/%.c,$(B)/tests/lib%.so,$(wildcard tests/shim/*.c))
 $(B)/tests/lib%.so: tests/shim/%.c

@@ -31,7 +31,9 @@ campaign: {
 OFF = ("l0", "@cob0")
 DEATHS = int(os.environ.get("GONIO_GUARD_DEATHS", "20"))
 SEED = int(os.environ.get("GONIO_TEST_SEED", "20261126"))
-MISHAP = {"LD_PRELOAD": str(BUILD / "tests" / "libmishap.so")}
+# AddressSanitizer wants to be the first library of all; here it need not.
+MISHAP = {"LD_PRELOAD": str(BUILD / "tests" / "libmishap.so"),
+          "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":verify_asan_link_order=0"}
 
 
 class Metronome:
