@@ -138,9 +138,11 @@ static int wait_for_devices(struct engine *e)
 int engine_pause_run(struct engine *e)
 {
     const enum run_state before = e->state;
-    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     char text[600];
     int rc;
+    instrument_breathe(e->in);
+    (void)engine_heed_guard(e); // what it did is the reason, whatever followed from it
+    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     engine_make_safe(e);
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
@@ -169,13 +170,13 @@ int main(int argc, char **argv)
     static const struct clk_ops ops = {now_ns, now_ns, turn};
     struct shell s = {.clk = {&ops}, .urgent = cancel_new()};
     sigset_t set;
-    if (argc != 3 || !s.urgent) {
-        fprintf(stderr, "gonio-guard FD PATH is started by goniod\n");
-        return 2;
-    }
+    if (argc != 3 || !s.urgent)
+        return 2;     // goniod starts it, and nobody else
     sigfillset(&set); // whoever sends one of them wants the end
     sigprocmask(SIG_SETMASK, &set, NULL);
-    mlockall(MCL_CURRENT | MCL_FUTURE); // both as far as we may
+    // Its main thread's end; that of the sockets waits for a thread that a slow disk holds.
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    mlockall(MCL_CURRENT); // both as far as we may
     setpriority(PRIO_PROCESS, 0, -15);
     s.fds[AT_CLIENT] = (struct pollfd){(int)strtol(argv[1], NULL, 10), POLLIN, 0};
     s.fds[AT_SIGNAL] = (struct pollfd){signalfd(-1, &set, SFD_CLOEXEC), POLLIN, 0};
