@@ -26,26 +26,32 @@ struct guardian {
     char stop[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
     pid_t pid; // 0: none
     int fd;
-    bool given; // to the link
+    int left;     // a guard that a dead goniod left behind, as a process; -1: none
+    bool given;   // to the link
+    bool crashes; // of ours are told to it
 };
 
 extern char **environ;
 
 // The one thing that a signal handler needs; written before there is a second thread, and by the
 // one that replaces a guard.
-static atomic_int crash_fd = -1;
+static atomic_int guard_pid = 0;
 
+// Not by closing the sockets: another thread would take that for the guard's death, and end it to
+// start another.
 static void when_crashed(int signal)
 {
-    shutdown(atomic_load(&crash_fd), SHUT_RDWR);
+    if (atomic_load(&guard_pid) > 0)
+        kill(atomic_load(&guard_pid), SIGTERM);
     raise(signal); // SA_RESETHAND: ends the process when we return
 }
 
-void guardian_when_crashed(const struct guardian *g)
+void guardian_when_crashed(struct guardian *g)
 {
     static const int signals[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGSYS, SIGTRAP};
     struct sigaction a = {.sa_handler = when_crashed, .sa_flags = (int)SA_RESETHAND};
-    atomic_store(&crash_fd, g->fd);
+    g->crashes = true;
+    atomic_store(&guard_pid, g->pid);
     for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++)
         sigaction(signals[i], &a, NULL);
 }
@@ -99,14 +105,27 @@ static int start(struct guardian *g, struct gon_error *err)
     return 0;
 }
 
-static bool ended(pid_t pid, int patience_ms)
+static int process_fd(pid_t pid)
 {
-    const int fd = (int)syscall(SYS_pidfd_open, pid, 0);
-    struct pollfd p = {fd, POLLIN, 0};
-    const bool over = fd < 0 || poll(&p, 1, patience_ms) > 0;
-    if (fd >= 0)
-        close(fd);
-    return over;
+    return (int)syscall(SYS_pidfd_open, pid, 0);
+}
+
+static bool ended(int process, int patience_ms)
+{
+    struct pollfd p = {process, POLLIN, 0};
+    return process < 0 || poll(&p, 1, patience_ms) > 0;
+}
+
+// One of a goniod that died, which still tries to switch off. Its port is wanted now; whoever wants
+// it begins with OFF.
+static void end_left(struct guardian *g)
+{
+    if (g->left < 0)
+        return;
+    syscall(SYS_pidfd_send_signal, g->left, SIGKILL, NULL, 0);
+    ended(g->left, END_MS);
+    close(g->left);
+    g->left = -1;
 }
 
 static void kill_it(struct guardian *g)
@@ -116,6 +135,7 @@ static void kill_it(struct guardian *g)
     g->fd = -1;
     if (g->pid == 0)
         return;
+    atomic_store(&guard_pid, 0);
     kill(g->pid, SIGKILL);
     waitpid(g->pid, NULL, 0);
     g->pid = 0;
@@ -125,11 +145,12 @@ static int connect_to(void *ctx, struct gon_error *err)
 {
     struct guardian *g = ctx;
     int rc = 0;
+    end_left(g);
     if (g->given) {
         kill_it(g);
         rc = start(g, err);
-        if (atomic_load(&crash_fd) >= 0)
-            atomic_store(&crash_fd, g->fd);
+        if (g->crashes && rc == 0)
+            atomic_store(&guard_pid, g->pid);
     }
     g->given = rc == 0;
     return rc < 0 ? rc : g->fd;
@@ -157,28 +178,20 @@ static pid_t listener_of(const char *path)
     return who.pid;
 }
 
-// It may be about to end by itself; it may also try for ever. Its port is wanted.
-static void end_left_behind(const char *path)
-{
-    const pid_t pid = listener_of(path);
-    if (pid <= 0 || ended(pid, 0) || kill(pid, SIGKILL) < 0)
-        return;
-    ended(pid, END_MS);
-}
-
 int guardian_start(const char *socket, struct guardian **ret_guardian, struct gon_error *err)
 {
     struct guardian *g = calloc(1, sizeof *g);
     if (!g)
         return gon_fail(err, GON_E_SYSTEM, "guard: out of memory");
-    g->fd = -1;
+    g->fd = g->left = -1;
     int rc = paths_guard(socket, g->stop, sizeof g->stop, err);
     if (rc == 0) {
-        end_left_behind(g->stop);
+        const pid_t left = listener_of(g->stop);
+        g->left = left > 0 ? process_fd(left) : -1;
         rc = start(g, err);
     }
     if (rc < 0) {
-        free(g);
+        guardian_end(g);
         return rc;
     }
     *ret_guardian = g;
@@ -189,12 +202,17 @@ void guardian_end(struct guardian *g)
 {
     if (!g)
         return;
-    atomic_store(&crash_fd, -1);
+    atomic_store(&guard_pid, 0);
     if (g->fd >= 0)
         close(g->fd);
-    if (g->pid && ended(g->pid, END_MS)) {
-        waitpid(g->pid, NULL, 0);
+    const int process = g->pid ? process_fd(g->pid) : -1;
+    if (g->pid && ended(process, END_MS)) {
+        waitpid(g->pid, NULL, WNOHANG);
         unlink(g->stop);
     }
+    if (process >= 0)
+        close(process);
+    if (g->left >= 0)
+        close(g->left);
     free(g);
 }

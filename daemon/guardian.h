@@ -2,8 +2,9 @@
 // The guard process (guard/): started before anything else, and anew when it died. It holds the
 // laser's port; this end has the process and the sockets, drivers/guard_link.h speaks.
 //
-// A guard that a dead goniod left behind, still trying to switch off, is ended first: ours begins
-// with OFF. Thread: the main thread starts and ends it; in between the instrument thread's.
+// A guard that a dead goniod left behind, still trying to switch off, is ended when ours is about
+// to be given the laser, and not before: it begins with OFF. Thread: the main thread starts and
+// ends it; in between the instrument thread's.
 #pragma once
 #include "base/err.h"
 #include "drivers/guard_link.h"
@@ -20,4 +21,4 @@ struct guard_host guardian_host(struct guardian *g);
 
 // When this process crashes (SIGSEGV, SIGABRT, ...) the guard is to know before a core is written,
 // which may take seconds. Once, for the process.
-void guardian_when_crashed(const struct guardian *g);
+void guardian_when_crashed(struct guardian *g);

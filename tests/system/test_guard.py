@@ -78,7 +78,7 @@ def alive(pid):
         return False
 
 
-def first_off_s(sim, since_ns, patience_s=20.0):
+def first_off_s(sim, since_ns, patience_s=5.0):
     """Seconds from a moment to the first OFF on the laser's wire."""
     end = time.monotonic() + patience_s
     while time.monotonic() < end:
