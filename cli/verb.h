@@ -31,6 +31,7 @@ extern const struct verb verb_queue, verb_control;
 extern const struct verb verb_list, verb_show, verb_verify, verb_backup;
 extern const struct verb verb_fit, verb_model;
 extern const struct verb verb_profile;
+extern const struct verb verb_laser;
 
 // Options into target, operands into operands: their count, or -1 after saying what was wrong.
 int verb_take(const struct verb *verb, int argc, char **argv, void *target, const char **operands,

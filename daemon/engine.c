@@ -316,6 +316,8 @@ static int measure(struct engine *e, const struct travel_pose *at)
             rc = engine_confirm_devices(e, &r);
         if (rc < 0)
             return rc;
+        if (e->lit && (rc = engine_heed_guard(e)) < 0)
+            return rc; // it went dark meanwhile: no reading
         e->attempt++;
         const struct store_reading row = row_of(e, &r, at);
         rc = store(e, &row);
@@ -473,6 +475,7 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
     instrument_obey(instrument, ports->cancel);
+    instrument_permit(instrument, false); // what the guard did before is past
     engine_enter(&e, RUN_PREPARING, NULL);
     const enum run_state ended = finish(&e, run_points(&e), err);
     instrument_obey(instrument, NULL);

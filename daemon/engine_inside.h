@@ -78,6 +78,8 @@ int engine_shut(struct engine *e);
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.
 int engine_light_for(struct engine *e);
+// The guard did not switch the laser off by itself, and is there.
+int engine_heed_guard(struct engine *e);
 // The laser was on and should be: one short question, and only when it is due; or all there is to
 // know.
 int engine_watch_laser(struct engine *e);

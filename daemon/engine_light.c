@@ -27,10 +27,20 @@ static int laser_trouble(struct engine *e, const struct laser_status *s)
     return 0;
 }
 
+int engine_heed_guard(struct engine *e)
+{
+    struct gon_error why;
+    if (instrument_alarm(e->in, &why) == 0)
+        return 0;
+    return gon_fail(&e->why, why.code, "%.400s; look at it, then: gonio resume", why.text);
+}
+
 int engine_check_laser(struct engine *e)
 {
     struct laser_status s;
-    int rc = instrument_laser(e->in, &s, &e->why);
+    int rc = engine_heed_guard(e);
+    if (rc >= 0)
+        rc = instrument_laser(e->in, &s, &e->why);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     if (rc >= 0)
         rc = laser_trouble(e, &s);
@@ -44,6 +54,8 @@ int engine_check_laser(struct engine *e)
 int engine_watch_laser(struct engine *e)
 {
     bool on;
+    if (e->lit && engine_heed_guard(e) < 0)
+        return e->why.code;
     if (!e->lit || clk_now_ns(e->ports->clk) < e->laser_look_ns)
         return 0;
     int rc = instrument_light(e->in, &on, &e->why);

@@ -156,9 +156,11 @@ static int wait_for_devices(struct engine *e)
 int engine_pause_run(struct engine *e)
 {
     const enum run_state before = e->state;
-    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     char text[600];
     int rc;
+    instrument_breathe(e->in);
+    (void)engine_heed_guard(e); // what it did is the reason, whatever followed from it
+    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     engine_make_safe(e);
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
@@ -174,6 +176,7 @@ int engine_pause_run(struct engine *e)
         rc = wait_for_operator(e);
         e->returns = 0;
     }
+    instrument_permit(e->in, false); // what the guard did meanwhile is past
     const bool returned = by_itself && !e->wanted; // and nobody took the pause over
     e->wanted = false;
     if (rc >= 0)

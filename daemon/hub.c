@@ -589,7 +589,8 @@ static int start_workers(struct hub *h, struct gon_error *err)
                              h->options.directory, h->store_box,        h->box,
                              h->run_box,           h->options.profiles, h->options.profiles_count};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
-    struct runner_links r = {h->options.bench, h->cancel, h->run_box, h->box, h->store_box};
+    struct runner_links r = {h->options.bench, h->options.guard, h->cancel,
+                             h->run_box,       h->box,           h->store_box};
     int rc = storer_start(&s, &h->storer, err);
     rc = rc < 0 ? rc : fitter_start(&f, &h->fitter, err);
     return rc < 0 ? rc : runner_start(&r, &h->runner, err);

@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 struct bench_config;
+struct guard_host;
 struct hub;
 struct log;
 struct store_profile;
@@ -20,6 +21,7 @@ struct loop;
 
 struct hub_options {
     const struct bench_config *bench; // borrowed for the hub's life
+    const struct guard_host *guard; // borrowed: the process that holds the laser's port
     const char *bench_text; // as read, for the campaign files
     const struct store_profile *profiles; // likewise, borrowed
     int profiles_count;

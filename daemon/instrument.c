@@ -4,9 +4,11 @@
 #include "campaign/bench.h"
 #include "daemon/instrument_inside.h"
 #include "drivers/bus.h"
+#include "drivers/by_profile.h"
 #include "drivers/device.h"
 #include "drivers/identity.h"
 #include "drivers/profile.h"
+#include "drivers/safing.h"
 
 #include <assert.h>
 #include <math.h>
@@ -178,6 +180,23 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     return m->axis->ops->stop(m->axis, err);
 }
 
+// Its port is opened by the guard, to which its record goes first.
+static int open_guarded(struct instrument *in, struct laser **ret_laser, struct gon_error *err)
+{
+    const struct part_state *p = &in->part[PART_LASER];
+    struct guard_record record;
+    struct transport *transport;
+    int rc =
+        in->laser_profile ? 0 : profile_open(p->driver, in->bench->folder, &in->laser_profile, err);
+    rc = rc < 0 ? rc : safing_of(in->laser_profile, p->address, &record, err);
+    if (rc < 0)
+        return rc;
+    if (!in->guard && !(in->guard = guard_link_new(&in->host, &record, &in->breathing.clk)))
+        return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    rc = transport_open_guarded(in->guard, p->address, &in->breathing.clk, &transport, err);
+    return rc < 0 ? rc : laser_over(in->laser_profile, transport, ret_laser, err);
+}
+
 int instrument_recognise(struct part_state *p, int rc, const char *identity, struct gon_error *err)
 {
     if (rc >= 0)
@@ -195,12 +214,15 @@ static int begin_laser(struct instrument *in, char *ret_identity, size_t size,
     struct laser *laser;
     if (in->safety)
         return safety_reopen(in->safety, ret_identity, size, err);
-    int rc = device_open_laser(p->driver, in->bench->folder, &in->laser_profile, p->address,
-                               &in->breathing.clk, NULL, &laser, err);
+    int rc = in->host.connect
+                 ? open_guarded(in, &laser, err)
+                 : device_open_laser(p->driver, in->bench->folder, &in->laser_profile, p->address,
+                                     &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    safety_guard(in->safety, in->guard);
     safety_obey(in->safety, in->stop);
     return safety_begin(in->safety, ret_identity, size, err);
 }
@@ -365,14 +387,16 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
     return hand_over(in, ret_instrument, err);
 }
 
-int instrument_open(const struct bench_config *bench, struct clk *clk,
-                    struct instrument **ret_instrument, struct gon_error *err)
+int instrument_open(const struct bench_config *bench, const struct guard_host *guard,
+                    struct clk *clk, struct instrument **ret_instrument, struct gon_error *err)
 {
     struct gon_error own;
     err = err ? err : &own;
     struct instrument *in = make(bench, clk);
     if (!in)
         return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
+    if (guard)
+        in->host = *guard;
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++)
         if (instrument_has(in, part)) {
             in->motor[part].bus = find_bus(bench, in->motor[part].config->bus);
@@ -390,6 +414,7 @@ bool instrument_free(struct instrument *in)
     in->watcher = NULL;
     const bool dark = in->safety && safety_free(in->safety) && in->behind == SAFETY_LIGHT_OFF;
     in->safety = NULL;
+    guard_link_free(in->guard);
     for (int i = 0; i < INSTRUMENT_AXES; i++)
         if (in->motor[i].axis) {
             in->motor[i].axis->ops->stop(in->motor[i].axis, NULL);

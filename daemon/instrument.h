@@ -29,6 +29,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+struct guard_host;
 struct inputs;
 struct instrument;
 struct selector;
@@ -114,8 +115,10 @@ struct instrument_parts {
 };
 
 // Opens what is there; what is not is lost, which is no error. GON_E_INPUT: a link's text is wrong;
-// GON_E_SYSTEM. The bench is borrowed for the object's life.
-int instrument_open(const struct bench_config *bench, struct clk *clk,
+// GON_E_SYSTEM. The bench is borrowed for the object's life. guard: who has the guard process that
+// is to hold the laser's port; NULL: this process opens it itself, which is for tests.
+int instrument_open(const struct bench_config *bench, const struct guard_host *guard,
+                    struct clk *clk,
                     struct instrument **ret_instrument, struct gon_error *err);
 int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts,
                    struct clk *clk, struct instrument **ret_instrument, struct gon_error *err);
@@ -193,6 +196,9 @@ void instrument_permit(struct instrument *in, bool running);
 // Once this stop is asked for, off goes out in the next slice of whatever is waited for, also in
 // the middle of another device's call. Borrowed until the next call; NULL: none.
 void instrument_obey(struct instrument *in, const struct cancel *stop);
+// What the laser's guard did without being asked, since the permission was given: 0, or why. The
+// laser is off then, or its guard is gone.
+int instrument_alarm(const struct instrument *in, struct gon_error *err);
 enum safety_light instrument_light_left(const struct instrument *in); // what may be said of it
 const struct safety *instrument_safety(const struct instrument *in);
 

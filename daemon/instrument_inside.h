@@ -6,6 +6,7 @@
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
 #include "drivers/backoff.h"
+#include "drivers/guard_link.h"
 
 struct bus;
 struct profile;
@@ -60,6 +61,8 @@ struct instrument {
     struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];
     struct profile *laser_profile, *detector_profile; // loaded when first needed; NULL before
+    struct guard_host host;   // no connect: there is no guard process
+    struct guard_link *guard; // NULL: not needed yet
     struct safety *safety;
     enum safety_light behind; // of the laser whose place another took; SAFETY_LIGHT_OFF: none did
     const struct cancel *stop; // that the laser obeys; NULL: none

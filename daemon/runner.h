@@ -10,12 +10,14 @@
 
 struct bench_config;
 struct cancel;
+struct guard_host;
 struct mail;
 struct runner;
 
 // All borrowed for the thread's life; bench is not changed by anybody.
 struct runner_links {
     const struct bench_config *bench;
+    const struct guard_host *guard; // of the process that holds the laser's port
     const struct cancel *cancel; // ends a run
     struct mail *box;            // the thread's own
     struct mail *to_main, *to_store;

@@ -29,8 +29,8 @@ def preload(program):
 class Dialogue(Program):
     """A program that answers each line with a line."""
 
-    def __init__(self, argv, log, env):
-        super().__init__(argv, log, env={"LD_PRELOAD": preload(argv[0]), **env}, stdin=subprocess.PIPE)
+    def __init__(self, argv, log, env, cwd=None):
+        super().__init__(argv, log, env={"LD_PRELOAD": preload(argv[0]), **env}, stdin=subprocess.PIPE, cwd=cwd)
 
     def say(self, line):
         self.process.stdin.write(line + "\n")
@@ -74,6 +74,15 @@ class Usb:
         else:
             assert client.process.wait(10) == 1
         return client, said
+
+    def guarded(self):
+        """A client whose device is held by a guard process."""
+        client = Dialogue([BUILD / "tests/linkask", METER, BUILD / "gonio-guard"], self.folder / "linkask.log", self.env,
+                          self.folder)
+        self.clients.append(client)
+        said = client.hear()
+        assert said.startswith("ok open"), said
+        return client
 
     def open(self, text=METER, *ends):
         client, said = self.link(text, *ends)

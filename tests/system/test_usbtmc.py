@@ -3,8 +3,10 @@
 (tests/usb/linkask), by gonio's driver, and by pyvisa-py, which knows nothing of gonio."""
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -282,3 +284,55 @@ def ask_errors(daemon):
     assert status == 200
     (detector,) = [d for d in reply["devices"] if d["kind"] == "detector"]
     return {kind: n for kind, n in detector["traffic"]["errors"].items() if n}
+
+
+# --- through a guard process -----------------------------------------------------------------------
+
+def wavelength_nm(client):
+    return round(float(re.match(r"ok (\S+) \(", client.ask("ask SENS:CORR:WAV?")).group(1)))
+
+
+def reads_1234(usb):
+    """What the meter is set to, by a client of its own, as soon as the guard has let it go."""
+    client, said = usb.link()
+    return said.startswith("ok open") and wavelength_nm(client) == 1234
+
+
+def test_over_usb_a_guard_lets_questions_and_answers_pass(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert wavelength_nm(meter) == 1234  # its first bytes were OFF
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+    said = meter.ask("bytes LONG? 5000")
+    text = bytes(ord("a") + i % 26 for i in range(4999)) + b"\n"
+    assert said.startswith(f"ok 5000 {crc32c(text):08x} "), said
+    assert meter.ask("ask NONSENSE?").startswith("error")
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+
+
+def test_over_usb_a_lease_that_runs_out_means_off(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    for _ in range(10):
+        assert meter.ask("renew").startswith("ok")
+        time.sleep(0.1)
+    assert wavelength_nm(meter) == 1550
+    time.sleep(1.0)
+    refused = meter.ask("ask SENS:CORR:WAV?")
+    assert refused.startswith("error refused") and "0.5 s" in refused, refused
+    assert meter.ask("off").startswith("ok")
+    assert wavelength_nm(meter) == 1234
+
+
+def test_over_usb_a_death_means_off(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    assert wavelength_nm(meter) == 1550
+    usb.clients.remove(meter)
+    meter.end(signal.SIGKILL)
+    wait_for(lambda: reads_1234(usb))

@@ -401,7 +401,7 @@ static void ports_that_are_not_there_do_not_stop_the_daemon(void **state)
     snprintf(s->bench.detector.link, sizeof s->bench.detector.link,
              "serial:/nowhere/detector?baud=9600");
     struct gon_error err;
-    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), 0);
+    assert_int_equal(instrument_open(&s->bench, NULL, &s->b.clk.clk, &s->in, &err), 0);
     instrument_snapshot(s->in, &s->now);
     for (int i = 0; i < PART_COUNT; i++) {
         if (expected(i, PART_OK) == PART_ABSENT)
@@ -425,7 +425,7 @@ static void a_link_that_is_no_link_is_an_error_of_the_bench(void **state)
     s->bench.axes_count = 0;
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "carrier-pigeon:laser");
     snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/detector");
-    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
+    assert_int_equal(instrument_open(&s->bench, NULL, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "laser: "));
     assert_null(s->in);
     free(s);
@@ -440,7 +440,7 @@ static void a_profile_that_is_not_there_is_an_error_of_the_bench(void **state)
     s->bench.axes_count = 0;
     snprintf(s->bench.laser.driver, sizeof s->bench.laser.driver, "cobolt-99");
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "serial:/nowhere/laser");
-    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
+    assert_int_equal(instrument_open(&s->bench, NULL, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "no profile 'cobolt-99': looked for "));
     free(s);
 }
