@@ -120,7 +120,16 @@ $(B)/tests/$(1): $(B)/obj/tests/slow/$(1).o $(patsubst %,$(B)/lib%.a,$(call slow
 endef
 $(foreach t,$(SLOW_TESTS),$(eval $(call slow_rules,$(t))))
 
-check-slow: $(SLOW_TESTS:%=$(B)/tests/%)
+# tests/dst: one program that simulates whole campaigns in virtual time, with libc's calls its own.
+DST_OBJ := $(patsubst %.c,$(B)/obj/%.o,$(wildcard tests/dst/*.c))
+DST_USES := $(shell sed -n 's,^// uses: *,,p' tests/dst/main.c)
+OBJECTS += $(DST_OBJ)
+$(B)/tests/dst: $(DST_OBJ) $(DST_USES:%=$(B)/lib%.a)
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(call libs_of,$(DST_USES))
+
+check-slow: $(SLOW_TESTS:%=$(B)/tests/%) $(B)/tests/dst
 	$(Q)set -e; for t in $^; do $$t; done
 
 SHIM := $(B)/tests/libptycompat.so

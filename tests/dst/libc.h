@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT
+// What tests/dst/libc.c has to know besides what the program calls. Thread: one.
+#pragma once
+#include "tests/dst/line.h"
+
+#define LIBC_DEVICES "/dev/dst-" // paths that begin so are lines
+enum { LIBC_LINES = 8 };
+
+void libc_add_line(struct line *l); // borrowed until libc_forget
+void libc_forget(void);             // all lines and all virtual descriptors
