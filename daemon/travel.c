@@ -9,6 +9,14 @@
 
 #define HOME_LEAST_S 120.0
 
+static int moved_by_itself(const struct bench_axis *axis, double from, double to,
+                           struct gon_error *err)
+{
+    return gon_fail(err, GON_E_DEVICE,
+                    "axis %s: moved by itself from %.4f to %.4f %s; look at it, then: gonio resume",
+                    axis->name, from, to, axis->unit_name);
+}
+
 // Encoders of all axes, also of those that were not to move: an axis that strays is noticed here.
 static int where(struct instrument *in, const struct travel_pose *target,
                  struct travel_pose *ret_pose, struct gon_error *err)
@@ -25,10 +33,7 @@ static int where(struct instrument *in, const struct travel_pose *target,
             const struct bench_axis *axis = instrument_axis(in, part);
             if (!isnan(target->at[part]) &&
                 fabs(p.position - target->at[part]) > 2.0 * bench_axis_tolerance(axis))
-                return gon_fail(err, GON_E_DEVICE,
-                                "axis %s: moved by itself from %.4f to %.4f %s; look at it, then: "
-                                "gonio resume",
-                                axis->name, target->at[part], p.position, axis->unit_name);
+                return moved_by_itself(axis, target->at[part], p.position, err);
         }
         pose.at[part] = p.position;
     }
@@ -88,6 +93,24 @@ int travel_move(struct instrument *in, const struct travel_pose *target,
     return rc < 0 ? rc : where(in, target, ret_actual, err);
 }
 
+int travel_still(struct instrument *in, const struct travel_pose *at, struct gon_error *err)
+{
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
+        struct axis_place p;
+        if (!instrument_has(in, part) || isnan(at->at[part]))
+            continue;
+        int rc = instrument_place(in, part, &p, err);
+        if (rc >= 0)
+            rc = travel_check(in, part, &p, err);
+        if (rc < 0)
+            return rc;
+        const struct bench_axis *axis = instrument_axis(in, part);
+        if (p.moving || fabs(p.position - at->at[part]) > bench_axis_tolerance(axis))
+            return moved_by_itself(axis, at->at[part], p.position, err);
+    }
+    return 0;
+}
+
 struct travel_pose travel_stay(void)
 {
     struct travel_pose pose = {.still_ns = 0};
@@ -137,6 +160,10 @@ static int home_one(struct instrument *in, enum instrument_part part, const stru
     if (p.alarm)
         return travel_check(in, part, &p, err);
 
+    // It may have restarted: what it has to be told first (an enable) went with its power.
+    rc = instrument_connect(in, part, err);
+    if (rc < 0)
+        return rc;
     const double limit_s = fmax(HOME_LEAST_S, 4.0 * (axis->max - axis->min) / axis->speed);
     const int64_t until_ns = instrument_now_ns(in) + CLK_S(limit_s);
     rc = instrument_go_home(in, part, err);

@@ -223,6 +223,18 @@ static void a_lost_home_position_is_never_trusted(void **state)
     assert_int_equal(move(s, 10, 10, 0, &at, &err), 0);
 }
 
+// A drive that lost its power may have lost its enable with it: it answers, and does not move.
+static void a_restarted_controller_is_identified_before_it_homes(void **state)
+{
+    struct setting *s = *state;
+    struct gon_error err = {0};
+    s->b.axis[PART_THETA_R].homed = false;
+    s->b.axis[PART_THETA_R].disabled = true;
+    if (travel_home(s->in, NULL, &err) < 0)
+        fail_msg("%s", err.text);
+    assert_true(s->b.axis[PART_THETA_R].homed);
+}
+
 static void targets_beyond_the_travel_are_refused_before_moving(void **state)
 {
     struct setting *s = *state;
@@ -478,6 +490,7 @@ int main(void)
         T(a_deadline_ends_a_move),
         T(an_alarm_ends_a_move_and_is_named),
         T(a_lost_home_position_is_never_trusted),
+        T(a_restarted_controller_is_identified_before_it_homes),
         T(targets_beyond_the_travel_are_refused_before_moving),
         T(a_cancel_ends_a_move_within_a_slice),
         T(stations_by_name),
