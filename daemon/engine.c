@@ -286,6 +286,18 @@ static double least_monitor_v(const struct engine *e)
                                        : dark_v + MONITOR_LOST * (e->monitor_lit_v - dark_v);
 }
 
+// What was read belongs to where the axes stood all the time; where that is not known it is kept, and
+// made again.
+static int verify_place(struct engine *e, const struct travel_pose *at, struct acquire_reading *r)
+{
+    const int rc = travel_still(e->in, at, &e->why);
+    if (rc < 0) {
+        r->flags |= rc == GON_E_DEVICE ? STORE_MOVED : STORE_DISCARDED;
+        r->accepted = false;
+    }
+    return rc;
+}
+
 static int measure(struct engine *e, const struct travel_pose *at)
 {
     const struct acquire_wish wish = {readings_of(e), e->light_ns, least_monitor_v(e)};
@@ -297,6 +309,8 @@ static int measure(struct engine *e, const struct travel_pose *at)
         if (rc < 0)
             return rc;
         e->attempt++;
+        const int still = verify_place(e, at, &r);
+        const struct gon_error why = e->why;
         const struct store_reading row = row_of(e, &r, at);
         rc = store(e, &row);
         if (rc < 0)
@@ -307,6 +321,10 @@ static int measure(struct engine *e, const struct travel_pose *at)
             begin_pace(e);
         }
         publish_reading(e, &r, at);
+        if (still < 0) {
+            e->why = why;
+            return still;
+        }
         if (r.accepted || !r.again)
             break;
         if (!e->ready) // the store paused the run: light and axes first

@@ -41,6 +41,7 @@ struct run {
     void (*on_pause)(struct run *r);
     int64_t cancel_at_ns;
     void (*on_time)(struct run *r);
+    bool strayed; // what on_time had to do once is done
 
     // what must never happen
     int violations;

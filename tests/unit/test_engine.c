@@ -718,6 +718,60 @@ static void another_bench_of_the_same_motors_measures_the_same(void **state)
     end(geared);
 }
 
+// True once: theta_r has stood for long enough that the filter settles or samples are taken.
+static bool amid_row_6(struct run *r)
+{
+    static int64_t still_ns;
+    const struct motion *m = &r->b.world.axis[WORLD_THETA_R];
+    if (r->rows != 6 || motion_at(m, r->b.clk.t_ns).moving)
+        still_ns = r->b.clk.t_ns;
+    if (r->strayed || r->b.clk.t_ns - still_ns < CLK_S(0.8))
+        return false;
+    return r->strayed = true;
+}
+
+static void stray_once(struct run *r)
+{
+    struct motion *m = &r->b.world.axis[WORLD_THETA_R];
+    if (amid_row_6(r))
+        motion_go(m, motion_at(m, r->b.clk.t_ns).motor + 1.0, 20, 60, 60, r->b.clk.t_ns);
+}
+
+static void what_was_read_while_an_axis_moved_is_no_reading(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_time = stray_once;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_true(r->strayed);
+    assert_complete(r);
+    assert_int_equal(r->row[6].flags & STORE_MOVED, STORE_MOVED);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "axis theta_r: moved by itself"));
+    double worst, rms;
+    compare(r, &worst, &rms);
+    assert_true(worst < 5.0);
+    end(r);
+}
+
+static void restart_once(struct run *r)
+{
+    if (amid_row_6(r))
+        r->b.axis[WORLD_THETA_R].homed = false;
+}
+
+// Where it stood while it was read nobody knows.
+static void what_was_read_while_a_controller_restarted_is_no_reading(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_time = restart_once;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->row[6].flags & STORE_DISCARDED, STORE_DISCARDED);
+    end(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -745,6 +799,8 @@ int main(void)
         cmocka_unit_test(nonsense_is_asked_again_and_in_the_end_somebody_is),
         cmocka_unit_test(a_restarted_controller_is_homed_again_in_the_dark),
         cmocka_unit_test(an_off_that_is_not_confirmed_is_repeated_until_it_is),
+        cmocka_unit_test(what_was_read_while_an_axis_moved_is_no_reading),
+        cmocka_unit_test(what_was_read_while_a_controller_restarted_is_no_reading),
         cmocka_unit_test(another_bench_of_the_same_motors_measures_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
