@@ -164,10 +164,28 @@ static void hit(struct line *l)
         l->next = LINE_GOOD;
 }
 
+// A converter that hangs says the same again.
+static void repeat_list(struct line *l, uint8_t *bytes, size_t *size)
+{
+    int commas = 0;
+    for (size_t i = 0; i < *size; i++)
+        commas += bytes[i] == ',';
+    if (commas == 0 || commas >= LINE_LISTS)
+        return;
+    if (l->stuck && l->kept_size[commas]) {
+        memcpy(bytes, l->kept[commas], l->kept_size[commas]);
+        *size = l->kept_size[commas];
+    }
+    memcpy(l->kept[commas], bytes, *size);
+    l->kept_size[commas] = *size;
+}
+
 static void answer(struct line *l, uint8_t *bytes, size_t size, int64_t due_ns)
 {
     if (l->hole)
         return;
+    if (!l->modbus)
+        repeat_list(l, bytes, &size);
     if (fits(l, bytes, size)) {
         answer_badly(l, bytes, size, due_ns);
         hit(l);

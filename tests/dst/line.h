@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <sys/types.h>
 
-enum { LINE_CHUNKS = 96, LINE_IN = 1 << 16 };
+enum { LINE_CHUNKS = 96, LINE_IN = 1 << 16, LINE_LISTS = 6 };
 
 // Of the next answer (LINE_DEAF: the next request) that it fits.
 enum line_fault {
@@ -57,6 +57,9 @@ struct line {
     int left;           // so many times
     const char *number; // LINE_NO_NUMBER
     int64_t late_ns;    // LINE_LATE, LINE_DOUBLED: by so much
+    bool stuck;         // text: lists of values are those of before
+    uint8_t kept[LINE_LISTS][PORT_REPLY_MOST]; // by the number of commas
+    size_t kept_size[LINE_LISTS];
     uint64_t hits;      // faults that struck
     int64_t hit_ns;     // the last one
     // bytes

@@ -19,6 +19,7 @@ struct arguments {
     const char *seeds;
     char *profiles;
     long seed, readings;
+    double faults;
     bool trace, once;
 };
 
@@ -33,6 +34,7 @@ static int run_seed(const struct arguments *a, uint64_t seed)
 {
     struct trial_spec spec = {
         .seed = seed, .readings = (int)a->readings, .profiles = a->profiles,
+        .faults_per_1000 = a->faults, .fault = -1,
         .trace = a->trace ? stdout : NULL};
     struct trial_result r, again;
     const double begin_s = cpu_s();
@@ -42,9 +44,9 @@ static int run_seed(const struct arguments *a, uint64_t seed)
     if (!a->once)
         trial_run(&spec, &again);
     const bool same = a->once || (r.hash == again.hash && r.dump == again.dump);
-    printf("%6" PRIu64 " %7d rows %7.2f h %6.2f s %4d pauses %016" PRIx64 " %016" PRIx64
+    printf("%6" PRIu64 " %7d rows %7.2f h %6.2f s %4d faults %4d pauses %016" PRIx64 " %016" PRIx64
            " gap %.0f ms %-8s %s%s%s\n",
-           seed, r.rows, r.virtual_s / 3600, s, r.pauses, r.hash, r.dump,
+           seed, r.rows, r.virtual_s / 3600, s, r.faults, r.pauses, r.hash, r.dump,
            (double)r.worst_gap_ns * 1e-6, run_state_name(r.state), r.bench,
            same ? "" : "; NOT THE SAME TWICE", r.violations ? "; BROKEN: " : "");
     if (r.violations)
@@ -55,11 +57,12 @@ static int run_seed(const struct arguments *a, uint64_t seed)
 
 int main(int argc, char **argv)
 {
-    struct arguments a = {.seeds = "1..5", .readings = 300};
+    struct arguments a = {.seeds = "1..5", .readings = 300, .faults = 15};
     const struct option_row rows[] = {
         {"--seeds", OPTION_TEXT, offsetof(struct arguments, seeds), "A..B", 0, 0, "which"},
         {"--seed", OPTION_INT, offsetof(struct arguments, seed), "N", 0, 1e9, "only this one"},
         {"--readings", OPTION_INT, offsetof(struct arguments, readings), "N", 4, 1e6, "points each"},
+        {"--faults", OPTION_REAL, offsetof(struct arguments, faults), "N", 0, 1000, "of 1000 readings"},
         {"--trace", OPTION_FLAG, offsetof(struct arguments, trace), NULL, 0, 0, "every byte"},
         {"--once", OPTION_FLAG, offsetof(struct arguments, once), NULL, 0, 0,
          "do not run each a second time"},

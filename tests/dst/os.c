@@ -146,19 +146,21 @@ void os_trace(const char *who, char way, const void *bytes, unsigned long size)
 
 // --- dice ----------------------------------------------------------------------------------------
 
+static uint64_t stir(uint64_t z)
+{
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+
 struct dice dice_of(uint64_t seed, uint64_t purpose)
 {
-    struct dice d = {seed * 0x9e3779b97f4a7c15u + purpose * 0xd1342543de82ef95u};
-    dice_bits(&d);
-    return d;
+    return (struct dice){stir(stir(seed + 1) ^ purpose * 0xd1342543de82ef95u)};
 }
 
 uint64_t dice_bits(struct dice *d)
 {
-    uint64_t z = d->state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
+    return stir(d->state += 0x9e3779b97f4a7c15u);
 }
 
 unsigned dice_below(struct dice *d, unsigned sides)

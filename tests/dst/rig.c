@@ -184,6 +184,12 @@ const char *rig_describe(const struct rig *r, char *text, size_t size)
     return text;
 }
 
+void rig_step(struct rig *r)
+{
+    if (r->unlocked)
+        r->bench.world.lockin.condition |= LOCKIN_UNLOCKED;
+}
+
 bool rig_emits(const struct rig *r)
 {
     const enum sim_laser_state s = r->bench.world.laser.state;

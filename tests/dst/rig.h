@@ -35,6 +35,7 @@ struct rig {
     struct bench bench;
     struct line line[RIG_LINES];
     struct rig_gate gate[RIG_AXES];
+    bool unlocked;         // the lock-in has no reference
     char bench_text[4000]; // goniod.cfg
 };
 
@@ -42,5 +43,6 @@ void rig_draw(struct rig_spec *ret_spec, uint64_t seed); // what kind of bench a
 void rig_init(struct rig *r, const struct rig_spec *spec);
 const char *rig_describe(const struct rig *r, char *text, size_t size);
 
+void rig_step(struct rig *r); // what goes on all the time
 bool rig_emits(const struct rig *r); // or is on its way: light may come at any moment
 double rig_steps_per_unit(void);

@@ -4,6 +4,8 @@
 #include "daemon/queue.h"
 #include "tests/dst/libc.h"
 
+#include <dirent.h>
+#include <fcntl.h>
 #include <math.h>
 #include <sqlite3.h>
 #include <stdlib.h>
@@ -11,6 +13,11 @@
 #include <unistd.h>
 
 #define SPAN_DEG 170.0
+#define NOTHING_NS OS_S(3 * 3600) // without a reading
+
+const char *const trial_moment_names[MOMENTS] = {"idle",     "preparing", "warming",
+                                                 "moving",   "settling",  "sampling",
+                                                 "storing",  "paused",    "stopping"};
 
 static void complain(void *ctx, const char *line)
 {
@@ -84,11 +91,56 @@ static void close_campaign(struct trial *t, enum run_state as)
 
 // --- the simulation ------------------------------------------------------------------------------
 
+static void strike(void *ctx, int arg)
+{
+    struct trial *t = ctx;
+    (void)arg;
+    fault_begin(t, t->spec.fault, t->spec.variant);
+    t->seen.begun = true;
+    t->homings_before = t->watch.homings;
+}
+
+static void ask_for(struct trial *t, enum trial_moment moment)
+{
+    if (moment == MOMENT_PAUSED)
+        t->wants_pause = true;
+    if (moment == MOMENT_STOPPING) {
+        watch_stop(&t->watch);
+        cancel_request(t->cancel);
+    }
+}
+
+// Not at the first chance but amid the campaign, where there is one.
+void trial_aim(struct trial *t, enum trial_moment now, int64_t at_ns)
+{
+    const bool early = now <= MOMENT_WARMING || now >= MOMENT_PAUSED;
+    if (t->spec.fault < 0 || t->aimed || now != t->spec.moment || (!early && t->watch.rows < 5))
+        return;
+    t->aimed = true;
+    os_at(at_ns, strike, t, 0);
+}
+
 static void step(void *ctx, int64_t t_ns)
 {
     struct trial *t = ctx;
-    if (t->watch.rig)
-        watch_step(&t->watch, t_ns);
+    if (!t->watch.rig)
+        return;
+    const int64_t until_ns = t->watch.moving_until_ns;
+    rig_step(&t->rig);
+    watch_step(&t->watch, t_ns);
+    if (t->ask_ns && t_ns >= t->ask_ns) {
+        t->ask_ns = 0;
+        ask_for(t, t->spec.moment);
+    }
+    if (t->watch.moving_until_ns > until_ns && !t->paused) {
+        trial_aim(t, MOMENT_MOVING, t_ns + (t->watch.moving_until_ns - t_ns) / 2);
+        trial_aim(t, MOMENT_SETTLING, t->watch.moving_until_ns + OS_MS(8));
+    }
+    if (t->watch.running && t_ns > t->row_ns + NOTHING_NS && !cancel_requested(t->cancel)) {
+        watch_violate(&t->watch, WATCH_WORDS, "no reading for 3 h, and it is %s",
+                      run_state_name(t->watch.state));
+        cancel_request(t->cancel);
+    }
 }
 
 static void breathed(void *ctx)
@@ -99,8 +151,11 @@ static void breathed(void *ctx)
 static void heard(void *ctx, const uint8_t *bytes, size_t size)
 {
     struct trial *t = ctx;
-    if (t->watch.rig)
-        watch_heard(&t->watch, bytes, size);
+    if (!t->watch.rig)
+        return;
+    watch_heard(&t->watch, bytes, size);
+    if (t->watch.samples > 0)
+        trial_aim(t, MOMENT_SAMPLING, os.now_ns + OS_MS(1));
 }
 
 static void begin(struct trial *t, const struct trial_spec *spec)
@@ -112,8 +167,9 @@ static void begin(struct trial *t, const struct trial_spec *spec)
     os_begin(step, t);
     os.trace = spec->trace;
     disk_begin();
+    t->dice = dice_of(spec->seed, 3);
     rig_draw(&rig, spec->seed);
-    rig_init(&t->rig, &rig);
+    rig_init(&t->rig, spec->rig ? spec->rig : &rig);
     t->rig.line[RIG_DETECTOR].heard = heard;
     t->rig.line[RIG_DETECTOR].ctx = t;
     if (bench_config_parse(t->rig.bench_text, "goniod.cfg", (struct cfg_sink){complain, NULL},
@@ -126,7 +182,13 @@ static void begin(struct trial *t, const struct trial_spec *spec)
     shop_begin(&t->shop, &t->bench, t->rig.bench_text, t->box, t->to_main);
     create(t);
     open_campaign(t);
-    watch_init(&t->watch, &t->rig, &t->bench, &t->material->plan);
+    t->plan = t->material->plan;
+    t->plan.points = malloc((size_t)t->plan.count * sizeof *t->plan.points);
+    if (!t->plan.points)
+        abort();
+    memcpy(t->plan.points, t->material->plan.points,
+           (size_t)t->plan.count * sizeof *t->plan.points);
+    watch_init(&t->watch, &t->rig, &t->bench, &t->plan);
     if (instrument_open(&t->bench, clk_system(), &t->in, &err) < 0)
         give_up("the bench", err.text);
     instrument_watch(t->in, breathed, t);
@@ -180,11 +242,24 @@ static void check_file(struct trial *t)
     store_close(s, NULL);
 }
 
+static void sweep_folder(void)
+{
+    DIR *d = opendir(".");
+    for (struct dirent *e; d && (e = readdir(d));)
+        unlinkat(dirfd(d), e->d_name, 0);
+    if (d)
+        closedir(d);
+}
+
 static void end(struct trial *t, struct trial_result *r)
 {
+    faults_mend(t, true);
     if (!instrument_free(t->in) && rig_emits(&t->rig))
         watch_violate(&t->watch, WATCH_EMISSION, "on after the instrument was closed");
+    t->seen.homings = t->watch.homings - t->homings_before;
     *r = (struct trial_result){.state = r->state,
+                               .seen = t->seen,
+                               .faults = t->injected,
                                .hash = os.hash,
                                .traced = os.traced,
                                .virtual_s = (double)os.now_ns * 1e-9 - 1000,
@@ -192,6 +267,7 @@ static void end(struct trial *t, struct trial_result *r)
                                .points = t->material->plan.count,
                                .pauses = t->pauses,
                                .worst_gap_ns = t->watch.worst_gap_ns};
+    memcpy(r->counts, t->counts, sizeof r->counts);
     rig_describe(&t->rig, r->bench, sizeof r->bench);
     close_campaign(t, r->state);
     shop_end(&t->shop);
@@ -205,25 +281,66 @@ static void end(struct trial *t, struct trial_result *r)
     r->violations = t->watch.all;
     snprintf(r->text, sizeof r->text, "%s", t->watch.text);
     watch_free(&t->watch);
+    free(t->plan.points);
     run_material_free(t->material);
-    unlink(t->path);
+    sweep_folder();
+}
+
+// As the instrument thread does while it has no campaign.
+static void idle(struct trial *t, double s)
+{
+    const int64_t until_ns = os.now_ns + OS_S(s);
+    trial_aim(t, MOMENT_IDLE, os.now_ns + OS_S(0.5));
+    while (os.now_ns < until_ns) {
+        instrument_tend(t->in);
+        os_sleep(OS_S(1));
+        watch_breath(&t->watch);
+    }
+}
+
+static enum run_state run_once(struct trial *t)
+{
+    struct engine_ports ports;
+    struct gon_error err = {0};
+    if (t->spec.moment == MOMENT_STOPPING || t->spec.moment == MOMENT_PAUSED)
+        t->ask_ns = os.now_ns + OS_S(12);
+    trial_ports(t, &ports);
+    t->row_ns = os.now_ns;
+    watch_breath(&t->watch);
+    const enum run_state s =
+        engine_run(&ports, t->in, &t->material->config, &t->material->plan, &err);
+    if (s == RUN_FAILED)
+        watch_violate(&t->watch, WATCH_WORDS, "failed: %s", err.text);
+    watch_end(&t->watch, s);
+    return s;
+}
+
+// A campaign that was stopped is closed, opened again and goes on.
+static void go_on(struct trial *t)
+{
+    close_campaign(t, RUN_STOPPED);
+    faults_mend(t, false);
+    run_material_free(t->material);
+    open_campaign(t);
+    cancel_reset(t->cancel);
+    t->seen.stops += t->seen.begun;
+    t->reading_open = t->resume = t->wants_pause = t->paused = false;
+    watch_resume(&t->watch);
 }
 
 void trial_run(const struct trial_spec *spec, struct trial_result *ret_result)
 {
-    struct engine_ports ports;
-    struct gon_error err = {0};
     struct trial *t = malloc(sizeof *t);
     if (!t)
         abort();
     begin(t, spec);
-    trial_ports(t, &ports);
-    ret_result->state =
-        engine_run(&ports, t->in, &t->material->config, &t->material->plan, &err);
-    watch_end(&t->watch, ret_result->state);
-    if (ret_result->state == RUN_FAILED)
-        watch_violate(&t->watch, WATCH_WORDS, "failed: %s", err.text);
+    idle(t, 2);
+    while ((ret_result->state = run_once(t)) == RUN_STOPPED && t->watch.stop) {
+        idle(t, 2);
+        go_on(t);
+    }
     t->watch.running = false;
+    idle(t, 2);
     end(t, ret_result);
     free(t);
 }

@@ -37,9 +37,35 @@ static int wait_stored(struct trial *t, struct gon_error *err)
     return t->answer.code;
 }
 
+static void happen(void *ctx, int arg)
+{
+    fault_begin(ctx, arg >> 16, arg & 0xffff);
+}
+
 static bool same(const struct store_reading *a, const struct store_reading *b)
 {
     return a->sweep == b->sweep && a->point == b->point && a->attempt == b->attempt;
+}
+
+// At random, after about so many readings.
+static void roll_for_fault(struct trial *t)
+{
+    if (dice_unit(&t->dice) >= t->spec.faults_per_1000 * 1e-3)
+        return;
+    int index;
+    do
+        index = (int)dice_below(&t->dice, (unsigned)faults_count());
+    while (!fault_fits(&faults[index], t) || faults[index].matrix_only);
+    os_at(os.now_ns + OS_S(dice_between(&t->dice, 0, 1.5)), happen, t,
+          index << 16 | (int)dice_below(&t->dice, 1 << 15));
+}
+
+static void acknowledged(struct trial *t, const struct store_reading *reading)
+{
+    watch_acknowledged(&t->watch, reading);
+    t->row_ns = os.now_ns;
+    t->seen.flagged += t->seen.begun && reading->flags & STORE_REJECTING & ~STORE_UNDER_RANGE;
+    roll_for_fault(t);
 }
 
 static int store_reading(void *ctx, const struct store_reading *reading, struct gon_error *err)
@@ -52,6 +78,7 @@ static int store_reading(void *ctx, const struct store_reading *reading, struct 
             abort();
         if (!same(reading, &t->reading))
             watch_offered(&t->watch, reading);
+        trial_aim(t, MOMENT_STORING, os.now_ns + OS_MS(0.05));
         *row = t->reading = *reading;
         n->run = t->id;
         n->thing = row;
@@ -63,7 +90,7 @@ static int store_reading(void *ctx, const struct store_reading *reading, struct 
     if (t->acknowledged == t->sequence)
         t->reading_open = false;
     if (rc == 0)
-        watch_acknowledged(&t->watch, reading);
+        acknowledged(t, reading);
     return rc;
 }
 
@@ -81,11 +108,52 @@ static int store_event(void *ctx, const char *level, const char *source, const c
     return GON_OK;
 }
 
+// Looks at it after a while, mends what can be mended, and says resume; again while it is paused.
+static void operate(void *ctx, int arg)
+{
+    struct trial *t = ctx;
+    (void)arg;
+    if (!t->paused)
+        return;
+    faults_mend(t, false);
+    t->resume = true;
+    os_at(os.now_ns + OS_S(dice_between(&t->dice, 5, 20)), operate, t, 0);
+}
+
+static void state_changed(struct trial *t, enum run_state state, const char *text)
+{
+    const bool was = t->paused;
+    const char *words = t->injected ? faults[t->last_fault].words : NULL;
+    t->paused = state == RUN_PAUSED;
+    if (t->paused) {
+        t->pauses += !was;
+        if (!was)
+            os_at(os.now_ns + OS_S(dice_between(&t->dice, 3, 20)), operate, t, 0);
+        trial_aim(t, MOMENT_PAUSED, os.now_ns + OS_S(1.05));
+        if (!t->seen.begun)
+            return;
+        if (!*t->seen.reason)
+            snprintf(t->seen.reason, sizeof t->seen.reason, "%s", text);
+        t->seen.warned |= strstr(text, "LASER MAY BE ON") != NULL;
+        t->seen.told |= words && strstr(text, words);
+    } else if (was && t->seen.begun) {
+        t->seen.operators += t->resumed;
+        t->seen.returns += !t->resumed;
+    }
+    t->resumed = false;
+    if (state == RUN_PREPARING)
+        trial_aim(t, MOMENT_PREPARING, os.now_ns + OS_S(0.3));
+    if (state == RUN_STOPPING)
+        trial_aim(t, MOMENT_STOPPING, os.now_ns);
+}
+
 // What the hub does with it, and what an operator does who reads it.
 static void publish(void *ctx, const struct engine_event *event)
 {
     struct trial *t = ctx;
     watch_event(&t->watch, event);
+    if (event->kind == ENGINE_LOG && event->text && strstr(event->text, "warming up"))
+        trial_aim(t, MOMENT_WARMING, os.now_ns + OS_S(1.5));
     if (event->kind != ENGINE_STATE)
         return;
     const char *text = event->text ? event->text : "";
@@ -96,11 +164,7 @@ static void publish(void *ctx, const struct engine_event *event)
     n->state = event->state;
     n->text = note_text(text);
     shop_post(&t->shop, n);
-    t->paused = event->state == RUN_PAUSED;
-    if (t->paused) {
-        t->pauses++;
-        snprintf(t->pause_text, sizeof t->pause_text, "%s", text);
-    }
+    state_changed(t, event->state, text);
 }
 
 static void request_fit(void *ctx, int sweep, bool last)
@@ -113,10 +177,10 @@ static void request_fit(void *ctx, int sweep, bool last)
 static bool take_resume(void *ctx)
 {
     struct trial *t = ctx;
-    if (!t->resume_ns || os.now_ns < t->resume_ns)
-        return false;
-    t->resume_ns = 0;
-    return true;
+    const bool was = t->resume;
+    t->resume = false;
+    t->resumed |= was;
+    return was;
 }
 
 static bool take_pause(void *ctx)

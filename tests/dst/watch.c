@@ -25,7 +25,7 @@ void watch_init(struct watch *w, struct rig *rig, const struct bench_config *ben
     w->bench = bench;
     w->plan = plan;
     w->breath_ns = os.now_ns;
-    w->laser_hit_ns = w->forced_ns = INT64_MIN / 2;
+    w->laser_hit_ns = w->forced_ns = w->world_ns = INT64_MIN / 2;
     for (int i = 0; i < RIG_AXES; i++) {
         w->motions[i] = rig->bench.world.axis[i].plan;
         w->unhomed_ns[i] = os.now_ns;
@@ -58,6 +58,18 @@ void watch_violate(struct watch *w, enum watch_rule rule, const char *fmt, ...)
     if (w->all++ == 0)
         snprintf(w->text, sizeof w->text, "%s: %s, at %.6f s", watch_rule_names[rule], text,
                  (double)os.now_ns * 1e-9);
+}
+
+void watch_stop(struct watch *w)
+{
+    w->stop = true;
+    w->stop_ns = os.now_ns;
+}
+
+void watch_resume(struct watch *w)
+{
+    w->stop = w->running = false;
+    w->samples = 0;
 }
 
 static bool at_rest(enum run_state s)
@@ -158,7 +170,7 @@ static void commanded(struct watch *w, int i, int64_t t_ns)
     const bool homing = b->controller == BENCH_AZ ? b->az[i].homing : b->leadshine[i].homing;
     const double left_s = motion_left_s(m, t_ns > m->start_ns ? t_ns : m->start_ns);
     const int64_t end_ns = later(t_ns, m->start_ns) + OS_S(left_s) + 1;
-    const double to = motion_at(m, end_ns).motor, slack = 2.0 / rig_steps_per_unit();
+    const double to = motion_at(m, end_ns).motor, slack = (2.0 + abs(w->rig->gate[i].miss_steps)) / rig_steps_per_unit(); // a drive that misses does so by itself
     w->moving_until_ns = later(w->moving_until_ns, end_ns);
     if (w->forced_ns == t_ns || isnan(m->end) || homing) // a fault, a stop, or homing
         return;
@@ -176,6 +188,9 @@ static void look_at_axes(struct watch *w, int64_t t_ns)
         const struct bench *b = &w->rig->bench;
         const bool homed = b->controller == BENCH_AZ ? b->az[i].homed : b->leadshine[i].homed;
         const int alarm = b->controller == BENCH_AZ ? b->az[i].alarm : b->leadshine[i].alarm;
+        const bool homing = b->controller == BENCH_AZ ? b->az[i].homing : b->leadshine[i].homing;
+        w->homings += homing && !w->is_homing[i];
+        w->is_homing[i] = homing;
         if (w->is_homed[i] && !homed)
             w->unhomed_ns[i] = t_ns;
         w->is_homed[i] = homed;

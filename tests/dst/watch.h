@@ -45,7 +45,8 @@ struct watch {
     uint64_t motions[RIG_AXES];
     bool moving;
     int64_t moving_until_ns, path_ns;
-    bool is_homed[RIG_AXES];
+    int homings; // begun
+    bool is_homed[RIG_AXES], is_homing[RIG_AXES];
     int64_t unhomed_ns[RIG_AXES], alarm_ns[RIG_AXES];
     // what the engine says
     bool running; // a campaign was begun and did not end
@@ -55,7 +56,7 @@ struct watch {
     int64_t stop_ns;
     // excuses: what was done to the laser and to the clock
     int64_t laser_hit_ns, forced_ns;
-    bool laser_lost; // by a fault that lasts
+    int64_t world_ns; // when dark or power were changed by a fault
     struct watch_sample sample[WATCH_SAMPLES];
     int samples;
     // rows that were acknowledged
@@ -73,6 +74,8 @@ void watch_free(struct watch *w);
 void watch_violate(struct watch *w, enum watch_rule rule, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 
+void watch_stop(struct watch *w);   // somebody asks for it
+void watch_resume(struct watch *w); // a stopped campaign goes on
 void watch_step(struct watch *w, int64_t t_ns);
 void watch_breath(struct watch *w);
 void watch_event(struct watch *w, const struct engine_event *event);

@@ -15,6 +15,7 @@
 #define PLAY_DEG 0.0155  // of the drive, where the approach does not take it up
 #define PLAN_DEG 0.0075  // two deadbands and a step
 #define FALLEN_V 1e-9    // what is left of the beam
+#define SETTLE_TC 40     // after another dark, of the filter's time constants
 
 static bool is_accepted(const struct store_reading *row)
 {
@@ -133,7 +134,9 @@ void watch_offered(struct watch *w, const struct store_reading *row)
     int index;
     const struct plan_point *p = planned(w, row->sweep, row->point, &index);
     struct choice c = {.w = w, .row = row, .left = 20000};
+    const double time_constant_s = w->rig->bench.world.lockin.time_constant_s;
     double truth_v = 0, monitor_v = 0, noise_v = 0;
+    bool steady = true; // the world itself did not change meanwhile, which nobody could see
     if (!p || !isfinite(row->signal_v) || row->count < 1) {
         watch_violate(w, WATCH_VALUES, "sweep %d, point %d: no such row can be", row->sweep,
                       row->point);
@@ -149,11 +152,13 @@ void watch_offered(struct watch *w, const struct store_reading *row)
         truth_v += s->truth_v / row->count;
         monitor_v += s->monitor_v / row->count;
         noise_v = s->noise_v;
+        steady = steady && s->t_ns > w->world_ns + OS_S(SETTLE_TC * time_constant_s);
+        if (!is_accepted(row)) // what is wrong with it is said
+            continue;
         check_place(w, row, p, s);
-        if (is_accepted(row))
-            check_light(w, row, p, s);
+        check_light(w, row, p, s);
     }
-    if (is_accepted(row))
+    if (is_accepted(row) && steady)
         check_truth(w, row, truth_v, noise_v, monitor_v);
     w->samples = 0;
 }
