@@ -573,7 +573,7 @@ const struct fault faults[] = {
     {"L8", "reference lost", REACT_REPEATS, 0, RIG_DETECTOR, unlock, lock, 0.5, NULL, NULL, false},
     {"L8", "reference lost for long", REACT_PAUSES, 0, RIG_DETECTOR, unlock, lock, 0, "reference",
      NULL, false},
-    {"D1", "saturated for 1 s", REACT_REPEATS, 0, RIG_DETECTOR, saturate, unsaturate, 1, NULL, NULL,
+    {"D1", "saturated for a moment", REACT_REPEATS, 0, RIG_DETECTOR, saturate, unsaturate, 0.03, NULL, NULL,
      false},
     {"D1", "saturated", REACT_PAUSES, 0, RIG_DETECTOR, saturate, unsaturate, 0, "saturated", NULL,
      false},
@@ -644,13 +644,15 @@ void fault_begin(struct trial *t, int index, int variant)
     if (!f->mend || t->active[index])
         return;
     t->active[index] = true;
+    t->began_ns[index] = os.now_ns;
     if (f->hold_s > 0)
         os_at(os.now_ns + OS_S(f->hold_s), mend, t, index);
 }
 
+// Who comes to a pause looks for what is wrong then, not for what happened after he had looked.
 void faults_mend(struct trial *t, bool all)
 {
     for (int i = 0; i < faults_count(); i++)
-        if (t->active[i] && (all || faults[i].hold_s == 0))
+        if (all || (faults[i].hold_s == 0 && t->began_ns[i] < t->paused_ns))
             mend(t, i);
 }

@@ -5,7 +5,7 @@
 //
 //   dst [--seeds A..B] [--readings N]     each seed twice: no rule broken, and the same trace twice
 //   dst --seed S [--readings N] --trace   one seed; every byte and state on stdout
-#include "tests/dst/trial.h"
+#include "tests/dst/matrix.h"
 
 #include "base/options.h"
 
@@ -20,7 +20,8 @@ struct arguments {
     char *profiles;
     long seed, readings;
     double faults;
-    bool trace, once;
+    bool trace, once, matrix;
+    long row;
 };
 
 static double cpu_s(void)
@@ -57,7 +58,7 @@ static int run_seed(const struct arguments *a, uint64_t seed)
 
 int main(int argc, char **argv)
 {
-    struct arguments a = {.seeds = "1..5", .readings = 300, .faults = 15};
+    struct arguments a = {.seeds = "1..5", .readings = 300, .faults = 15, .row = -1};
     const struct option_row rows[] = {
         {"--seeds", OPTION_TEXT, offsetof(struct arguments, seeds), "A..B", 0, 0, "which"},
         {"--seed", OPTION_INT, offsetof(struct arguments, seed), "N", 0, 1e9, "only this one"},
@@ -66,6 +67,9 @@ int main(int argc, char **argv)
         {"--trace", OPTION_FLAG, offsetof(struct arguments, trace), NULL, 0, 0, "every byte"},
         {"--once", OPTION_FLAG, offsetof(struct arguments, once), NULL, 0, 0,
          "do not run each a second time"},
+        {"--matrix", OPTION_FLAG, offsetof(struct arguments, matrix), NULL, 0, 0,
+         "each fault in each state instead"},
+        {"--row", OPTION_INT, offsetof(struct arguments, row), "N", -1, 100, "only that one"},
         {0}};
     struct gon_error err;
     char folder[] = "/tmp/gonio-dst-XXXXXX", *end;
@@ -84,6 +88,11 @@ int main(int argc, char **argv)
         return 2;
     }
     int failed = 0;
+    if (a.matrix) {
+        const int bad = matrix_run(a.profiles, (int)a.row, stdout);
+        printf("dst: %d cells of the matrix failed\n", bad);
+        return bad != 0;
+    }
     for (uint64_t seed = first; seed <= last; seed++)
         failed += run_seed(&a, seed);
     if (chdir("/") == 0)

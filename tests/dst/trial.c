@@ -68,16 +68,23 @@ static void create(struct trial *t)
     note_free(n);
 }
 
+// While its disk is broken a file cannot be opened: somebody tries again.
 static void open_campaign(struct trial *t)
 {
-    struct note *n = note_new(NOTE_OPEN);
-    n->run = t->id;
-    n->name = note_text(t->path);
-    n = shop_ask(&t->shop, n, NOTE_OPENED);
-    if (!n || !n->thing)
-        give_up(t->path, n ? n->err.text : "no answer");
-    t->material = note_steal(n);
-    note_free(n);
+    struct gon_error err = {0};
+    for (int i = 0; i < 100; i++) {
+        struct note *n = note_new(NOTE_OPEN);
+        n->run = t->id;
+        n->name = note_text(t->path);
+        n = shop_ask(&t->shop, n, NOTE_OPENED);
+        t->material = n ? note_steal(n) : NULL;
+        err = n ? n->err : err;
+        note_free(n);
+        if (t->material)
+            return;
+        os_sleep(OS_S(5));
+    }
+    give_up(t->path, err.text);
 }
 
 static void close_campaign(struct trial *t, enum run_state as)
@@ -319,7 +326,6 @@ static enum run_state run_once(struct trial *t)
 static void go_on(struct trial *t)
 {
     close_campaign(t, RUN_STOPPED);
-    faults_mend(t, false);
     run_material_free(t->material);
     open_campaign(t);
     cancel_reset(t->cancel);

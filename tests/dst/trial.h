@@ -77,6 +77,8 @@ struct trial {
     int64_t row_ns; // when there was one last
     // faults
     bool active[TRIAL_FAULTS];
+    int64_t began_ns[TRIAL_FAULTS];
+    int64_t paused_ns; // since when
     int counts[TRIAL_FAULTS];
     int injected, last_fault;
     bool aimed;     // at its moment: on the agenda

@@ -126,6 +126,7 @@ static void state_changed(struct trial *t, enum run_state state, const char *tex
     const char *words = t->injected ? faults[t->last_fault].words : NULL;
     t->paused = state == RUN_PAUSED;
     if (t->paused) {
+        t->paused_ns = os.now_ns;
         t->pauses += !was;
         if (!was)
             os_at(os.now_ns + OS_S(dice_between(&t->dice, 3, 20)), operate, t, 0);
