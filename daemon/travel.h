@@ -41,7 +41,8 @@ int travel_to_sample(const struct instrument *in, double theta_i_deg, double the
 // The pose of a station by its name; GON_E_INPUT when the bench has none of that name.
 int travel_station(const struct instrument *in, const char *name, struct travel_pose *ret_pose,
                    struct gon_error *err);
-// Homes the axes that say they are not, each after it was identified again; others stay. An axis
-// with an alarm is GON_E_DEVICE.
+// Homes the axes that say they are not, each after it was identified again; others stay. One that
+// for 2 s neither moves nor is homed (it restarted) is told again, twice at most. An axis with an
+// alarm is GON_E_DEVICE.
 int travel_home(struct instrument *in, const struct cancel *cancel, struct gon_error *err);
 int travel_stop(struct instrument *in, struct gon_error *err); // all of them; the first error

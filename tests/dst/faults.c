@@ -130,7 +130,13 @@ static void text_cut(struct trial *t, int v)
 
 static void text_late(struct trial *t, int v)
 {
-    text_line(t, v)->late_ns = late_ns(v);
+    text_line(t, v)->late_ns = OS_MS(20 + v % 60 * 5);
+    line_disturb(text_line(t, v), v % 3 ? LINE_LATE : LINE_DOUBLED, 1);
+}
+
+static void text_very_late(struct trial *t, int v)
+{
+    text_line(t, v)->late_ns = OS_MS(500 + v % 50 * 50);
     line_disturb(text_line(t, v), v % 3 ? LINE_LATE : LINE_DOUBLED, 1);
 }
 
@@ -552,6 +558,8 @@ const struct fault faults[] = {
      NULL, false},
     {"S8", "late or doubled answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_late, NULL, 0, NULL, NULL,
      false},
+    {"S8", "very late or doubled answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_very_late, NULL, 0,
+     NULL, "where it meets the read-back of a setting, takes it for a refusal and pauses", false},
     {"S8", "split or merged answers", REACT_GOES_ON, 0, RIG_DETECTOR, text_split, NULL, 0, NULL,
      NULL, false},
     {"S10", "line without an end", REACT_GOES_ON, 0, RIG_DETECTOR, endless, NULL, 0, NULL, NULL,
@@ -569,7 +577,7 @@ const struct fault faults[] = {
     {"L5", "ignores OFF", REACT_WARNS, NEEDS_LIGHT, RIG_LASER, ignore_off, obey_off, 15,
      "LASER MAY BE ON", NULL, false},
     {"L6", "light by itself", REACT_WARNS, 0, RIG_LASER, light_by_itself, NULL, 0, NULL,
-     "see the table: in darks and pauses", false},
+     "switches it off again within a second, and tells nobody", false},
     {"L8", "reference lost", REACT_REPEATS, 0, RIG_DETECTOR, unlock, lock, 0.5, NULL, NULL, false},
     {"L8", "reference lost for long", REACT_PAUSES, 0, RIG_DETECTOR, unlock, lock, 0, "reference",
      NULL, false},
@@ -641,6 +649,7 @@ void fault_begin(struct trial *t, int index, int variant)
     t->last_fault = index;
     t->counts[index]++;
     f->begin(t, variant);
+    watch_step(&t->watch, os.now_ns); // what was done now is not the engine's doing
     if (!f->mend || t->active[index])
         return;
     t->active[index] = true;

@@ -137,6 +137,7 @@ static void step(void *ctx, int64_t t_ns)
     watch_step(&t->watch, t_ns);
     if (t->ask_ns && t_ns >= t->ask_ns) {
         t->ask_ns = 0;
+        t->asked = true;
         ask_for(t, t->spec.moment);
     }
     if (t->watch.moving_until_ns > until_ns && !t->paused) {
@@ -309,7 +310,7 @@ static enum run_state run_once(struct trial *t)
 {
     struct engine_ports ports;
     struct gon_error err = {0};
-    if (t->spec.moment == MOMENT_STOPPING || t->spec.moment == MOMENT_PAUSED)
+    if (!t->asked && (t->spec.moment == MOMENT_STOPPING || t->spec.moment == MOMENT_PAUSED))
         t->ask_ns = os.now_ns + OS_S(12);
     trial_ports(t, &ports);
     t->row_ns = os.now_ns;

@@ -82,6 +82,7 @@ struct trial {
     int counts[TRIAL_FAULTS];
     int injected, last_fault;
     bool aimed;     // at its moment: on the agenda
+    bool asked;
     int64_t ask_ns; // when a pause or a stop is to be asked for, for its moment
     struct trial_seen seen;
     int homings_before;

@@ -12,6 +12,8 @@
 #define REST_NS OS_S(8)    // until a laser that can be reached is off at rest: its reopening is paced
 #define ALARM_NS OS_S(20)  // until an axis's alarm is noticed: at the latest at the next move
 #define LOST_NS OS_S(1)    // a command that was on its way when home was lost
+#define STOP_NS OS_S(1.5)  // an ON that was on its way when a stop came
+#define STOPPED_NS OS_S(8) // until a laser that can be reached is off after a stop
 #define PATH_NS OS_MS(5)
 
 const char *const watch_rule_names[WATCH_RULES] = {"emission", "motion", "values", "rows",
@@ -99,8 +101,9 @@ static void switched_on(struct watch *w, int64_t t_ns)
             t_ns > w->alarm_ns[i] + LOST_NS)
             watch_violate(w, WATCH_EMISSION, "switched on with an alarm of %s",
                           world_axis_names[i]);
-    if (w->stop)
-        watch_violate(w, WATCH_EMISSION, "switched on after a stop");
+    if (w->stop && t_ns > w->stop_ns + STOP_NS) // ON was on its way: OFF follows
+        watch_violate(w, WATCH_EMISSION, "switched on %.1f s after a stop",
+                      (double)(t_ns - w->stop_ns) * 1e-9);
 }
 
 static void look_at_light(struct watch *w, int64_t t_ns)
@@ -124,6 +127,8 @@ static void look_at_light(struct watch *w, int64_t t_ns)
     if (w->running && at_rest(w->state) && t_ns > due_ns)
         watch_violate(w, WATCH_EMISSION, "still on %.1f s after %s, and the laser can be reached",
                       (double)(t_ns - w->state_ns) * 1e-9, run_state_name(w->state));
+    if (w->stop && t_ns > later(w->stop_ns, w->laser_hit_ns) + STOPPED_NS && t_ns > w->forced_ns + REST_NS)
+        watch_violate(w, WATCH_EMISSION, "on %.1f s after a stop", (double)(t_ns - w->stop_ns) * 1e-9);
     for (int i = 0; i < RIG_AXES; i++)
         if (w->alarm_ns[i] != OS_NEVER &&
             t_ns > later(w->alarm_ns[i] + ALARM_NS, w->laser_hit_ns + REST_NS))
