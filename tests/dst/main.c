@@ -20,7 +20,7 @@ struct arguments {
     char *profiles;
     long seed, readings;
     double faults;
-    bool trace, once, matrix;
+    bool trace, once, matrix, mutations;
     long row;
 };
 
@@ -69,6 +69,8 @@ int main(int argc, char **argv)
          "do not run each a second time"},
         {"--matrix", OPTION_FLAG, offsetof(struct arguments, matrix), NULL, 0, 0,
          "each fault in each state instead"},
+        {"--mutations", OPTION_FLAG, offsetof(struct arguments, mutations), NULL, 0, 0,
+         "defects put in on purpose instead, which must be reported"},
         {"--row", OPTION_INT, offsetof(struct arguments, row), "N", -1, 100, "only that one"},
         {0}};
     struct gon_error err;
@@ -92,6 +94,11 @@ int main(int argc, char **argv)
         const int bad = matrix_run(a.profiles, (int)a.row, stdout);
         printf("dst: %d cells of the matrix failed\n", bad);
         return bad != 0;
+    }
+    if (a.mutations) {
+        const int missed = mutation_run_all(a.profiles, stdout);
+        printf("dst: %d mutations were not reported\n", missed);
+        return missed != 0;
     }
     for (uint64_t seed = first; seed <= last; seed++)
         failed += run_seed(&a, seed);

@@ -43,6 +43,10 @@ static void falsify(struct rig_gate *g, int address, int count, uint16_t *regist
             registers[i] = g->frozen_at[at - position];
         if (g->never_done && at == status && az)
             registers[i] = (uint16_t)((registers[i] | 1 << 13) & ~(1 << 14 | 1 << 5));
+        if (g->hides_alarm && at == status)
+            registers[i] = (uint16_t)((registers[i] & ~(1 << 7)) | 1 << 14 | 1 << 5);
+        if (g->hides_alarm && (at == 0x0080 || at == 0x0081))
+            registers[i] = 0;
         if (g->never_done && at == status && !az)
             registers[i] = (uint16_t)((registers[i] | 1 << 2) & ~(1 << 4 | 1 << 5));
     }

@@ -18,6 +18,7 @@ struct rig_gate { // between a Modbus unit and its registers
     bool frozen;               // the encoder stands still
     uint16_t frozen_at[2];
     bool never_done;           // it says that it moves
+    bool hides_alarm;          // AZ
     int misses;                // the next moves end somewhere else
     int32_t miss_steps;
 };

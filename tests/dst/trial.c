@@ -287,6 +287,8 @@ static void end(struct trial *t, struct trial_result *r)
     libc_forget();
     r->dump = hash_file(t->path);
     r->violations = t->watch.all;
+    memcpy(r->rules, t->watch.violations, sizeof r->rules);
+    memcpy(r->texts, t->watch.texts, sizeof r->texts);
     snprintf(r->text, sizeof r->text, "%s", t->watch.text);
     watch_free(&t->watch);
     free(t->plan.points);

@@ -8,6 +8,7 @@
 #include "daemon/material.h"
 #include "tests/dst/disk.h"
 #include "tests/dst/faults.h"
+#include "tests/dst/mutation.h"
 #include "tests/dst/rig.h"
 #include "tests/dst/shop.h"
 #include "tests/dst/watch.h"
@@ -39,6 +40,7 @@ struct trial_spec {
     int fault;                  // one of the table, at a moment; -1: none
     enum trial_moment moment;
     int variant;
+    const struct mutation *mutation; // a defect put in; NULL: none
     FILE *trace;
 };
 
@@ -71,7 +73,7 @@ struct trial {
     bool reading_open;
     struct store_reading reading;
     // the operator
-    bool paused, wants_pause, resume, resumed;
+    bool paused, wants_pause, resume, resumed, no_operator;
     struct dice dice;
     int pauses;
     int64_t row_ns; // when there was one last
@@ -97,6 +99,8 @@ struct trial_result {
     int64_t worst_gap_ns;
     struct trial_seen seen;
     char text[WATCH_TEXT]; // the first violation
+    int rules[WATCH_RULES];
+    char texts[WATCH_RULES][WATCH_TEXT];
     char bench[120];
 };
 

@@ -68,29 +68,43 @@ static void acknowledged(struct trial *t, const struct store_reading *reading)
     roll_for_fault(t);
 }
 
+static void post(struct trial *t, const struct store_reading *stored)
+{
+    struct note *n = note_new(NOTE_READING);
+    struct store_reading *row = malloc(sizeof *row);
+    if (!row)
+        abort();
+    *row = *stored;
+    n->run = t->id;
+    n->thing = row;
+    n->sequence = ++t->sequence;
+    t->reading_open = true;
+    shop_post(&t->shop, n);
+}
+
 static int store_reading(void *ctx, const struct store_reading *reading, struct gon_error *err)
 {
     struct trial *t = ctx;
-    if (!t->reading_open || !same(reading, &t->reading)) {
-        struct note *n = note_new(NOTE_READING);
-        struct store_reading *row = malloc(sizeof *row);
-        if (!row)
-            abort();
-        if (!same(reading, &t->reading))
-            watch_offered(&t->watch, reading);
-        trial_aim(t, MOMENT_STORING, os.now_ns + OS_MS(0.05));
-        *row = t->reading = *reading;
-        n->run = t->id;
-        n->thing = row;
-        n->sequence = ++t->sequence;
-        t->reading_open = true;
-        shop_post(&t->shop, n);
+    struct store_reading stored = *reading, told = *reading;
+    int rc = 0;
+    if (mutation_of_reading(t, &stored, &told)) {
+        watch_offered(&t->watch, &told);
+    } else {
+        if (!same(reading, &t->reading)) {
+            watch_offered(&t->watch, &told);
+            trial_aim(t, MOMENT_STORING, os.now_ns + OS_MS(0.05));
+        }
+        if (!t->reading_open || !same(reading, &t->reading))
+            post(t, &stored);
+        t->reading = *reading;
+        rc = wait_stored(t, err);
+        if (t->acknowledged == t->sequence)
+            t->reading_open = false;
     }
-    const int rc = wait_stored(t, err);
-    if (t->acknowledged == t->sequence)
-        t->reading_open = false;
-    if (rc == 0)
-        acknowledged(t, reading);
+    if (rc == 0) {
+        acknowledged(t, &told);
+        mutation_after_row(t);
+    }
     return rc;
 }
 
@@ -113,7 +127,7 @@ static void operate(void *ctx, int arg)
 {
     struct trial *t = ctx;
     (void)arg;
-    if (!t->paused)
+    if (!t->paused || t->no_operator)
         return;
     faults_mend(t, false);
     t->resume = true;
@@ -149,9 +163,12 @@ static void state_changed(struct trial *t, enum run_state state, const char *tex
 }
 
 // What the hub does with it, and what an operator does who reads it.
-static void publish(void *ctx, const struct engine_event *event)
+static void publish(void *ctx, const struct engine_event *told)
 {
     struct trial *t = ctx;
+    struct engine_event own = *told;
+    const struct engine_event *event = &own;
+    mutation_of_event(t, &own);
     watch_event(&t->watch, event);
     if (event->kind == ENGINE_LOG && event->text && strstr(event->text, "warming up"))
         trial_aim(t, MOMENT_WARMING, os.now_ns + OS_S(1.5));

@@ -10,7 +10,7 @@
 
 #define LEASE_NS OS_MS(500)
 #define REST_NS OS_S(8)    // until a laser that can be reached is off at rest: its reopening is paced
-#define ALARM_NS OS_S(20)  // until an axis's alarm is noticed: at the latest at the next move
+#define ALARM_NS OS_S(5)   // until an axis's alarm is noticed: at the latest after the reading
 #define LOST_NS OS_S(1)    // a command that was on its way when home was lost
 #define STOP_NS OS_S(1.5)  // an ON that was on its way when a stop came
 #define STOPPED_NS OS_S(8) // until a laser that can be reached is off after a stop
@@ -55,7 +55,8 @@ void watch_violate(struct watch *w, enum watch_rule rule, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    w->violations[rule]++;
+    if (w->violations[rule]++ == 0)
+        snprintf(w->texts[rule], WATCH_TEXT, "%s", text);
     os_trace("watch", '!', text, strlen(text));
     if (w->all++ == 0)
         snprintf(w->text, sizeof w->text, "%s: %s, at %.6f s", watch_rule_names[rule], text,

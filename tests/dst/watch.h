@@ -66,6 +66,7 @@ struct watch {
     // found
     int violations[WATCH_RULES], all;
     char text[WATCH_TEXT]; // the first
+    char texts[WATCH_RULES][WATCH_TEXT]; // the first of each
 };
 
 void watch_init(struct watch *w, struct rig *rig, const struct bench_config *bench,
