@@ -447,7 +447,7 @@ static void step_clock(struct trial *t, int v)
 static void suspend(struct trial *t, int v)
 {
     os_suspend(OS_S(2 + v % 600));
-    t->watch.breath_ns = os.now_ns; // nobody could breathe
+    t->watch.breath_ns = t->watch.laser_hit_ns = os.now_ns; // nobody could do anything
 }
 
 static void fill_disk(struct trial *t, int v)

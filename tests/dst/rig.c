@@ -77,12 +77,12 @@ static int32_t target_of(const uint16_t *registers)
 }
 
 // AZ: direct data operation. What goes nowhere slips nowhere.
-static bool is_far_move(const struct rig_gate *g, int address, int count, const uint16_t *registers,
+static bool is_move(const struct rig_gate *g, int address, int count, const uint16_t *registers,
                         int64_t t_ns)
 {
     if (g->rig->spec.controller != BENCH_AZ || address != 0x0058 || count != 16)
         return false;
-    return abs(target_of(registers) - bench_motor(&g->rig->bench, g->axis, t_ns).steps) > 100;
+    return abs(target_of(registers) - bench_motor(&g->rig->bench, g->axis, t_ns).steps) > 10;
 }
 
 static int gate_write(void *ctx, int address, int count, const uint16_t *registers, int64_t t_ns)
@@ -92,7 +92,7 @@ static int gate_write(void *ctx, int address, int count, const uint16_t *registe
     const int exception = refused(g);
     if (exception)
         return exception;
-    if (is_far_move(g, address, count, registers, t_ns) && g->misses > 0) {
+    if (is_move(g, address, count, registers, t_ns) && g->misses > 0) {
         memcpy(changed, registers, (size_t)count * sizeof *changed);
         const int32_t to = target_of(registers) + g->miss_steps;
         changed[4] = (uint16_t)((uint32_t)to >> 16);

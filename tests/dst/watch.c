@@ -119,9 +119,10 @@ static void look_at_light(struct watch *w, int64_t t_ns)
     w->laser_hit_ns = later(w->laser_hit_ns, line->hit_ns);
     if (!emits)
         return;
-    if (w->running && t_ns - w->breath_ns > w->worst_gap_ns)
+    const bool leased = w->running && w->state != RUN_STOPPED && w->state != RUN_DONE;
+    if (leased && t_ns - w->breath_ns > w->worst_gap_ns)
         w->worst_gap_ns = t_ns - w->breath_ns;
-    if (w->running && t_ns - w->breath_ns > LEASE_NS)
+    if (leased && t_ns - w->breath_ns > LEASE_NS)
         watch_violate(w, WATCH_EMISSION, "on for %.3f s without a breath",
                       (double)(t_ns - w->breath_ns) * 1e-9);
     const int64_t due_ns = later(later(w->state_ns, w->laser_hit_ns), w->forced_ns) + REST_NS;
