@@ -99,6 +99,15 @@ void engine_enter(struct engine *e, enum run_state state, const char *text)
 
 // --- storing ----------------------------------------------------------------------------------
 
+// The light is looked after meanwhile: an off that was not confirmed is repeated.
+static void wait_to_store(struct engine *e)
+{
+    const int64_t until_ns = clk_now_ns(e->ports->clk) + STORE_RETRY_NS;
+    while (clk_now_ns(e->ports->clk) < until_ns && engine_nap(e, CLK_MS(100)) == 0)
+        instrument_reconnect(e->in);
+    instrument_tend(e->in);
+}
+
 // The row is offered until it is accepted: nothing that was measured is lost, and nothing goes on
 // before.
 static int store(struct engine *e, const struct store_reading *row)
@@ -113,7 +122,7 @@ static int store(struct engine *e, const struct store_reading *row)
     engine_make_safe(e);
     engine_enter_pause(e, text);
     while (rc == GON_E_STORE) {
-        instrument_wait(e->in, clk_now_ns(e->ports->clk) + STORE_RETRY_NS, e->ports->cancel);
+        wait_to_store(e);
         rc = e->ports->store_reading(e->ports->ctx, row, &e->why);
         if (rc == GON_E_STORE && cancel_requested(e->ports->cancel))
             return engine_canceled(e);

@@ -99,7 +99,7 @@ int travel_still(struct instrument *in, const struct travel_pose *at, struct gon
 {
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
         struct axis_place p;
-        if (!instrument_has(in, part) || isnan(at->at[part]))
+        if (!instrument_has(in, part))
             continue;
         int rc = instrument_place(in, part, &p, err);
         if (rc >= 0)
@@ -107,6 +107,8 @@ int travel_still(struct instrument *in, const struct travel_pose *at, struct gon
         if (rc < 0)
             return rc;
         const struct bench_axis *axis = instrument_axis(in, part);
+        if (isnan(at->at[part]))
+            continue;
         if (p.moving || fabs(p.position - at->at[part]) > bench_axis_tolerance(axis))
             return moved_by_itself(axis, at->at[part], p.position, err);
     }

@@ -238,13 +238,12 @@ void watch_event(struct watch *w, const struct engine_event *event)
     const char *text = event->text ? event->text : "";
     if (event->state == RUN_PAUSED && !*text)
         watch_violate(w, WATCH_WORDS, "paused without a reason");
-    if (strstr(text, "laser off") && rig_emits(w->rig))
+    const bool known = os.now_ns > w->forced_ns + REST_NS; // not of what came by itself just now
+    if (known && strstr(text, "laser off") && rig_emits(w->rig))
         watch_violate(w, WATCH_WORDS, "\"%.100s\" with the light on", text);
-    if (at_rest(event->state) && event->light == SAFETY_LIGHT_OFF && rig_emits(w->rig) &&
-        w->forced_ns != os.now_ns)
+    if (at_rest(event->state) && event->light == SAFETY_LIGHT_OFF && rig_emits(w->rig) && known)
         watch_violate(w, WATCH_WORDS, "says the light is off in \"%.100s\"", text);
-    if (at_rest(event->state) && rig_emits(w->rig) && !strstr(text, "LASER MAY BE ON") &&
-        os.now_ns > w->forced_ns + REST_NS)
+    if (at_rest(event->state) && rig_emits(w->rig) && !strstr(text, "LASER MAY BE ON") && known)
         watch_violate(w, WATCH_WORDS, "does not warn of the light: \"%.100s\"", text);
     w->running = true;
     w->state = event->state;

@@ -772,6 +772,69 @@ static void what_was_read_while_a_controller_restarted_is_no_reading(void **stat
     end(r);
 }
 
+static void off_is_ignored_and_the_store_fails_at_row_7(struct run *r)
+{
+    if (r->rows != 7)
+        return;
+    r->b.world.laser.ignores_off = true;
+    r->store_fail_at = 8;
+    r->store_fails = 30; // half a minute
+}
+
+static void obey_off_after_ten_seconds(struct run *r)
+{
+    static int64_t since_ns;
+    if (r->state != RUN_PAUSED)
+        since_ns = r->b.clk.t_ns;
+    else if (r->b.clk.t_ns - since_ns > CLK_S(10))
+        r->b.world.laser.ignores_off = false;
+}
+
+static void an_off_is_repeated_also_while_the_store_is_waited_for(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_row = off_is_ignored_and_the_store_fails_at_row_7;
+    r->on_time = obey_off_after_ten_seconds;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    end(r); // never on at rest once it obeys
+}
+
+static int64_t alarmed_ns, noticed_ns;
+
+static void raise_alarm_while_warming(struct run *r)
+{
+    if (!r->strayed && r->b.ons == 1 && emits(r)) {
+        r->strayed = true;
+        r->b.axis[WORLD_SAMPLE].alarm = 0x30;
+        alarmed_ns = r->b.clk.t_ns;
+    }
+}
+
+static void note_time_and_clear(struct run *r)
+{
+    noticed_ns = r->b.clk.t_ns;
+    r->b.axis[WORLD_SAMPLE].alarm = 0;
+}
+
+static void an_alarm_while_the_laser_warms_up_pauses(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->bench.laser.warmup_s = 60;
+    r->on_time = raise_alarm_while_warming;
+    r->on_pause = note_time_and_clear;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "axis sample: alarm 30h"));
+    assert_int_equal(r->rows, r->plan.count); // the dark only, before
+    assert_int_equal(r->b.ons, 2);
+    assert_true(noticed_ns - alarmed_ns < CLK_S(2));
+    end(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -799,6 +862,8 @@ int main(void)
         cmocka_unit_test(nonsense_is_asked_again_and_in_the_end_somebody_is),
         cmocka_unit_test(a_restarted_controller_is_homed_again_in_the_dark),
         cmocka_unit_test(an_off_that_is_not_confirmed_is_repeated_until_it_is),
+        cmocka_unit_test(an_off_is_repeated_also_while_the_store_is_waited_for),
+        cmocka_unit_test(an_alarm_while_the_laser_warms_up_pauses),
         cmocka_unit_test(what_was_read_while_an_axis_moved_is_no_reading),
         cmocka_unit_test(what_was_read_while_a_controller_restarted_is_no_reading),
         cmocka_unit_test(another_bench_of_the_same_motors_measures_the_same),
