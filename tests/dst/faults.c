@@ -286,6 +286,8 @@ static void slip(struct trial *t, int v)
 static void stray(struct trial *t, int v)
 {
     struct motion *m = &t->rig.bench.world.axis[v % 2];
+    if (t->rig.gate[v % 2].frozen) // nobody could tell
+        return;
     t->watch.forced_ns = os.now_ns;
     world_see(&t->rig.bench.world, os.now_ns);
     const double at = motion_at(m, os.now_ns).motor;

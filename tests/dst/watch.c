@@ -14,6 +14,7 @@
 #define LOST_NS OS_S(1)    // a command that was on its way when home was lost
 #define STOP_NS OS_S(1.5)  // an ON that was on its way when a stop came
 #define STOPPED_NS OS_S(8) // until a laser that can be reached is off after a stop
+#define ASKED_NS OS_S(2)   // from the axes' answers to ON: the laser is asked many things before
 #define PATH_NS OS_MS(5)
 
 const char *const watch_rule_names[WATCH_RULES] = {"emission", "motion", "values", "rows",
@@ -99,7 +100,7 @@ static void switched_on(struct watch *w, int64_t t_ns)
         watch_violate(w, WATCH_EMISSION, "switched on with the interlock open");
     for (int i = 0; i < RIG_AXES; i++)
         if (bench_motor(&w->rig->bench, (enum world_axis)i, t_ns).alarm &&
-            t_ns > w->alarm_ns[i] + LOST_NS)
+            t_ns > w->alarm_ns[i] + ASKED_NS)
             watch_violate(w, WATCH_EMISSION, "switched on with an alarm of %s",
                           world_axis_names[i]);
     if (w->stop && t_ns > w->stop_ns + STOP_NS) // ON was on its way: OFF follows

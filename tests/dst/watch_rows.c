@@ -99,7 +99,8 @@ static void check_place(struct watch *w, const struct store_reading *row,
         watch_violate(w, WATCH_VALUES, "sweep %d, point %d was read while an axis moved", row->sweep,
                       row->point);
     for (int i = 0; i < 2; i++) {
-        if (fabs(s->motor[i] - at[i]) > STEP_DEG || fabs(s->load[i] - at[i]) > PLAY_DEG)
+        const double step = w->rig->gate[i].frozen ? PLAN_DEG : STEP_DEG; // it stopped on its way in
+        if (fabs(s->motor[i] - at[i]) > step || fabs(s->load[i] - at[i]) > PLAY_DEG)
             watch_violate(w, WATCH_VALUES, "sweep %d, point %d says %s %.4f, it was %.4f (load %.4f)",
                           row->sweep, row->point, world_axis_names[i], at[i], s->motor[i],
                           s->load[i]);
