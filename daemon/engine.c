@@ -240,7 +240,7 @@ static int prepare(struct engine *e)
     e->ready = rc >= 0;
     e->pace_ns = 0;
     instrument_permit(e->in, e->ready);
-    e->acquire = (struct acquire){.range = -1};
+    e->acquire = (struct acquire){.range = -1, .set_up = true}; // whoever was there may have turned it
     return rc;
 }
 

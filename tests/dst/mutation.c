@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { READINGS = 80, ROW = 20 };
+enum { READINGS = 200, ROW = 20 };
 
 // --- behind the engine's back --------------------------------------------------------------------
 

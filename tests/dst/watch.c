@@ -10,7 +10,7 @@
 
 #define LEASE_NS OS_MS(500)
 #define REST_NS OS_S(8)    // until a laser that can be reached is off at rest: its reopening is paced
-#define ALARM_NS OS_S(5)   // until an axis's alarm is noticed: at the latest after the reading
+#define ALARM_NS OS_S(12)  // until an axis's alarm is noticed: at the latest when the store answered
 #define LOST_NS OS_S(1)    // a command that was on its way when home was lost
 #define STOP_NS OS_S(1.5)  // an ON that was on its way when a stop came
 #define STOPPED_NS OS_S(8) // until a laser that can be reached is off after a stop

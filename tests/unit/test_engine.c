@@ -834,6 +834,25 @@ static void an_alarm_while_the_laser_warms_up_pauses(void **state)
     end(r);
 }
 
+static void somebody_turns_a_knob(struct run *r)
+{
+    r->b.world.lockin.time_constant_s = 1.0;
+}
+
+// Also one that restarted then and whose sign of it was read by nobody.
+static void the_detector_is_set_up_again_after_a_pause(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_row = pause_at_seventh_row;
+    r->on_pause = somebody_turns_a_knob;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 1);
+    assert_true(r->b.world.lockin.time_constant_s == r->bench.detector.time_constant_s);
+    end(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -861,6 +880,7 @@ int main(void)
         cmocka_unit_test(nonsense_is_asked_again_and_in_the_end_somebody_is),
         cmocka_unit_test(a_restarted_controller_is_homed_again_in_the_dark),
         cmocka_unit_test(an_off_that_is_not_confirmed_is_repeated_until_it_is),
+        cmocka_unit_test(the_detector_is_set_up_again_after_a_pause),
         cmocka_unit_test(an_off_is_repeated_also_while_the_store_is_waited_for),
         cmocka_unit_test(an_alarm_while_the_laser_warms_up_pauses),
         cmocka_unit_test(what_was_read_while_an_axis_moved_is_no_reading),
