@@ -44,6 +44,11 @@ static int identify(struct detector *d, char *ret_text, size_t size, struct gon_
     return session_identify(detector_of(d)->s, ret_text, size, err);
 }
 
+static const struct link_stats *stats(const struct detector *d)
+{
+    return message_stats(session_message(((const struct profiled_detector *)d)->s));
+}
+
 // --- ranges --------------------------------------------------------------------------------------
 
 static int by_size(const void *a, const void *b)
@@ -282,7 +287,11 @@ static bool has_changed(struct profiled_detector *z, const struct profile_asks *
 static int condition(struct detector *d, unsigned *ret_flags, struct gon_error *err)
 {
     struct profiled_detector *z = detector_of(d);
+    const struct link_stats *book = stats(d);
+    const uint64_t resyncs = book->resyncs;
     int rc = session_ask(z->s, &z->is->condition, err);
+    if (book->resyncs != resyncs) // reading clears it: what a lost answer told is gone
+        z->flags |= DETECTOR_UNSETTLED;
     if (session_restarted(z->s))
         z->restarted = true;
     if (rc < 0)
@@ -303,11 +312,6 @@ static int reopen(struct detector *d, struct gon_error *err)
     int rc = session_reopen(z->s, err);
     put_setup(z); // what samples are asked with
     return rc;
-}
-
-static const struct link_stats *stats(const struct detector *d)
-{
-    return message_stats(session_message(((const struct profiled_detector *)d)->s));
 }
 
 static void detector_free(struct detector *d)
