@@ -8,13 +8,13 @@
 #include <stdint.h>
 
 struct disk {
-    bool full;          // ENOSPC
-    bool broken_write;  // EIO
+    bool full;         // ENOSPC
+    bool broken_write; // EIO
     bool broken_sync;
     bool broken_read;
     int64_t locked_until_ns; // somebody else has the write lock, by the store's own clock
-    int64_t stall_ns;   // the next sync takes that much longer, once
-    int64_t sync_ns;    // what each takes
+    int64_t stall_ns;        // the next sync takes that much longer, once
+    int64_t sync_ns;         // what each takes
     uint64_t writes, syncs, refused;
 };
 

@@ -131,13 +131,19 @@ static void text_cut(struct trial *t, int v)
 static void text_late(struct trial *t, int v)
 {
     text_line(t, v)->late_ns = OS_MS(20 + v % 60 * 5);
-    line_disturb(text_line(t, v), v % 3 ? LINE_LATE : LINE_DOUBLED, 1);
+    line_disturb(text_line(t, v), LINE_LATE, 1);
 }
 
 static void text_very_late(struct trial *t, int v)
 {
     text_line(t, v)->late_ns = OS_MS(500 + v % 50 * 50);
-    line_disturb(text_line(t, v), v % 3 ? LINE_LATE : LINE_DOUBLED, 1);
+    line_disturb(text_line(t, v), LINE_LATE, 1);
+}
+
+static void text_doubled(struct trial *t, int v)
+{
+    text_line(t, v)->late_ns = OS_MS(20 + v % 60 * 5);
+    line_disturb(text_line(t, v), LINE_DOUBLED, 1);
 }
 
 static void text_split(struct trial *t, int v)
@@ -169,7 +175,8 @@ static void comma(struct trial *t, int v)
 
 static void no_number(struct trial *t, int v)
 {
-    static const char *const answers[] = {"nan", "inf", "-INF", "OVLD", "9.9E37", "9.91E37", "1.2 V"};
+    static const char *const answers[] = {"nan",    "inf",     "-INF", "OVLD",
+                                          "9.9E37", "9.91E37", "1.2 V"};
     t->rig.line[RIG_DETECTOR].number = answers[v % 7];
     line_disturb(&t->rig.line[RIG_DETECTOR], LINE_NO_NUMBER, 1);
 }
@@ -240,8 +247,7 @@ static void clear_alarms(struct trial *t)
 static void freeze(struct trial *t, int v)
 {
     struct rig_gate *g = gate(t, v);
-    const uint32_t at =
-        (uint32_t)bench_motor(&t->rig.bench, g->axis, os.now_ns).steps;
+    const uint32_t at = (uint32_t)bench_motor(&t->rig.bench, g->axis, os.now_ns).steps;
     g->frozen_at[0] = (uint16_t)(at >> 16);
     g->frozen_at[1] = (uint16_t)at;
     g->frozen = true;
@@ -517,7 +523,8 @@ const struct fault faults[] = {
     {"M1", "no answer", REACT_GOES_ON, 0, RIG_BUS, lose, NULL, 0, NULL, NULL, false},
     {"M1", "no answers at all for a while", REACT_RETURNS, 0, RIG_BUS, lose_many, NULL, 0,
      "not answer", NULL, false},
-    {"M2", "a bit is wrong", REACT_GOES_ON, NEEDS_SERIAL, RIG_BUS, flip, NULL, 0, NULL, NULL, false},
+    {"M2", "a bit is wrong", REACT_GOES_ON, NEEDS_SERIAL, RIG_BUS, flip, NULL, 0, NULL, NULL,
+     false},
     {"M3", "exception 1, 2, 3", REACT_PAUSES, 0, RIG_BUS, exception_123, NULL, 0, "exception", NULL,
      false},
     {"M4", "exception 4", REACT_HOMES, 0, RIG_BUS, exception_4, NULL, 0, "exception",
@@ -526,8 +533,8 @@ const struct fault faults[] = {
     {"M6", "wrong unit or function", REACT_GOES_ON, 0, RIG_BUS, wrong_header, NULL, 0, NULL, NULL,
      false},
     {"M7", "late or doubled answer", REACT_GOES_ON, 0, RIG_BUS, late, NULL, 0, NULL, NULL, false},
-    {"M8", "cut, split, merged, garbage", REACT_GOES_ON, 0, RIG_BUS, mangle_bus, NULL, 0, NULL, NULL,
-     false},
+    {"M8", "cut, split, merged, garbage", REACT_GOES_ON, 0, RIG_BUS, mangle_bus, NULL, 0, NULL,
+     NULL, false},
     {"M9", "connection ended or reset", REACT_RETURNS, NEEDS_TCP, RIG_BUS, break_bus, NULL, 0, NULL,
      NULL, false},
     {"M10", "connection half open", REACT_RETURNS, NEEDS_TCP, RIG_BUS, hole, fill, 12, NULL, NULL,
@@ -539,7 +546,8 @@ const struct fault faults[] = {
      false},
     {"M13", "encoder stands still", REACT_PAUSES, 0, RIG_BUS, freeze, thaw, 0, NULL, NULL, false},
     {"M14", "limit switch", REACT_PAUSES, 0, RIG_BUS, limit, clear_alarms, 0, "alarm", NULL, false},
-    {"M15", "misses its target", REACT_GOES_ON, NEEDS_AZ, RIG_BUS, miss, NULL, 0, NULL, NULL, false},
+    {"M15", "misses its target", REACT_GOES_ON, NEEDS_AZ, RIG_BUS, miss, NULL, 0, NULL, NULL,
+     false},
     {"M15", "always misses it", REACT_PAUSES, NEEDS_AZ, RIG_BUS, miss_always, hit, 0, "instead of",
      NULL, false},
     {"M16", "slips by 0.05 deg", REACT_HOMES, 0, RIG_BUS, slip, NULL, 0, NULL,
@@ -558,10 +566,12 @@ const struct fault faults[] = {
     {"S6", "decimal comma", REACT_GOES_ON, 0, RIG_DETECTOR, comma, NULL, 0, NULL, NULL, false},
     {"S7", "answer that is no number", REACT_GOES_ON, 0, RIG_DETECTOR, no_number, NULL, 0, NULL,
      NULL, false},
-    {"S8", "late or doubled answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_late, NULL, 0, NULL, NULL,
+    {"S8", "late answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_late, NULL, 0, NULL, NULL,
      false},
-    {"S8", "very late or doubled answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_very_late, NULL, 0,
-     NULL, "where it meets the read-back of a setting, takes it for a refusal and pauses", false},
+    {"S8", "very late answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_very_late, NULL, 0, NULL, NULL,
+     false},
+    {"S8", "doubled answer", REACT_GOES_ON, 0, RIG_DETECTOR, text_doubled, NULL, 0, NULL,
+     "goes on, but pauses where it is taken for the read-back of a setting", false},
     {"S8", "split or merged answers", REACT_GOES_ON, 0, RIG_DETECTOR, text_split, NULL, 0, NULL,
      NULL, false},
     {"S10", "line without an end", REACT_GOES_ON, 0, RIG_DETECTOR, endless, NULL, 0, NULL, NULL,
@@ -572,8 +582,8 @@ const struct fault faults[] = {
      NULL, false},
     {"L2", "goes off by itself", REACT_PAUSES, NEEDS_LIGHT, RIG_LASER, go_out, NULL, 0, "laser",
      NULL, false},
-    {"L3", "power drifts by 3 to 10 %", REACT_REPEATS, NEEDS_LIGHT, RIG_LASER, weaken, NULL, 0, NULL,
-     "goes on: the monitor corrects it, and nothing is flagged", false},
+    {"L3", "power drifts by 3 to 10 %", REACT_REPEATS, NEEDS_LIGHT, RIG_LASER, weaken, NULL, 0,
+     NULL, "goes on: the monitor corrects it, and nothing is flagged", false},
     {"L4", "fault", REACT_PAUSES, NEEDS_LIGHT, RIG_LASER, laser_fault, turn_key, 0, "laser", NULL,
      false},
     {"L5", "ignores OFF", REACT_WARNS, NEEDS_LIGHT, RIG_LASER, ignore_off, obey_off, 15,
@@ -583,8 +593,8 @@ const struct fault faults[] = {
     {"L8", "reference lost", REACT_REPEATS, 0, RIG_DETECTOR, unlock, lock, 0.5, NULL, NULL, false},
     {"L8", "reference lost for long", REACT_PAUSES, 0, RIG_DETECTOR, unlock, lock, 0, "reference",
      NULL, false},
-    {"D1", "saturated for a moment", REACT_REPEATS, 0, RIG_DETECTOR, saturate, unsaturate, 0.03, NULL, NULL,
-     false},
+    {"D1", "saturated for a moment", REACT_REPEATS, 0, RIG_DETECTOR, saturate, unsaturate, 0.03,
+     NULL, NULL, false},
     {"D1", "saturated", REACT_PAUSES, 0, RIG_DETECTOR, saturate, unsaturate, 0, "saturated", NULL,
      false},
     {"D3", "dark changes", REACT_PAUSES, 0, RIG_DETECTOR, lights_on, lights_off, 30, NULL,

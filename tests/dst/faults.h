@@ -11,13 +11,13 @@ struct trial;
 
 // What must be seen. Each includes that the campaign is complete in the end.
 enum reaction {
-    REACT_GOES_ON,  // at most a pause that ends by itself
-    REACT_RETURNS,  // a pause that ends by itself
-    REACT_REPEATS,  // a reading is kept with a flag and made again
-    REACT_HOMES,    // stops, homes again, and goes on
-    REACT_PAUSES,   // until an operator comes
-    REACT_WARNS,    // pauses with the words LASER MAY BE ON, and off once it obeys
-    REACT_STOPS     // ends as asked, and can be resumed
+    REACT_GOES_ON, // at most a pause that ends by itself
+    REACT_RETURNS, // a pause that ends by itself
+    REACT_REPEATS, // a reading is kept with a flag and made again
+    REACT_HOMES,   // stops, homes again, and goes on
+    REACT_PAUSES,  // until an operator comes
+    REACT_WARNS,   // pauses with the words LASER MAY BE ON, and off once it obeys
+    REACT_STOPS    // ends as asked, and can be resumed
 };
 
 extern const char *const reaction_names[];
@@ -39,8 +39,8 @@ struct fault {
     void (*mend)(struct trial *t); // NULL: it is over at once
     double hold_s;                 // mended after so long; 0: by the operator
     const char *words;             // in the reason of the pause; NULL: any
-    const char *not_yet;           // what the product does instead of the reaction; NULL: it does it
-    bool matrix_only;              // not_yet, and the campaign's rules would break
+    const char *not_yet; // what the product does instead of the reaction; NULL: it does it
+    bool matrix_only;    // not_yet, and the campaign's rules would break
 };
 
 extern const struct fault faults[];

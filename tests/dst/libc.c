@@ -36,7 +36,7 @@ static struct descriptor {
     enum kind kind;
     struct line *line; // KIND_SOCKET: NULL until it is connected
     uint64_t events;
-    bool connecting;   // to something that does not answer
+    bool connecting; // to something that does not answer
 } descriptors[COUNT];
 
 static struct line *lines[LIBC_LINES];
@@ -383,7 +383,7 @@ int clock_gettime(clockid_t clock, struct timespec *ret)
 {
     if (!os.on)
         return REAL(clock_gettime)(clock, ret);
-    const int64_t ns = clock == CLOCK_REALTIME    ? os_utc_ns()
+    const int64_t ns = clock == CLOCK_REALTIME   ? os_utc_ns()
                        : clock == CLOCK_BOOTTIME ? os_monotonic_ns() + os.asleep_ns
                                                  : os_monotonic_ns();
     *ret = (struct timespec){ns / 1000000000, ns % 1000000000};

@@ -12,10 +12,10 @@
 #define DEAD_NS OS_S(5) // TCP_USER_TIMEOUT
 
 const char *const line_fault_names[LINE_FAULTS] = {
-    "good",        "lost",           "late",         "doubled",    "cut",
-    "split",       "merged",         "garbage first", "garbage behind", "bit flipped",
-    "request lost", "wrong unit",    "wrong function", "stale number", "wrong echo",
-    "decimal comma", "no number",    "echo",         "endless"};
+    "good",          "lost",       "late",           "doubled",        "cut",
+    "split",         "merged",     "garbage first",  "garbage behind", "bit flipped",
+    "request lost",  "wrong unit", "wrong function", "stale number",   "wrong echo",
+    "decimal comma", "no number",  "echo",           "endless"};
 
 void line_init(struct line *l, const char *name, const char *path, uint32_t address,
                struct port *device, bool modbus, uint64_t seed)
@@ -51,7 +51,8 @@ static void queue_garbage(struct line *l, int64_t due_ns)
     uint8_t bytes[7];
     const size_t size = 1 + dice_below(&l->dice, sizeof bytes);
     for (size_t i = 0; i < size; i++)
-        bytes[i] = (uint8_t)(l->modbus ? dice_below(&l->dice, 256) : 128 + dice_below(&l->dice, 128));
+        bytes[i] =
+            (uint8_t)(l->modbus ? dice_below(&l->dice, 256) : 128 + dice_below(&l->dice, 128));
     queue(l, bytes, size, due_ns);
 }
 
@@ -324,7 +325,8 @@ int64_t line_next_ns(void *line)
 {
     const struct line *l = line;
     const int64_t due_ns = l->chunks ? l->chunk[0].due_ns : OS_NEVER;
-    const int64_t dead_ns = !l->path && l->unheard_ns && !l->hung ? l->unheard_ns + DEAD_NS : OS_NEVER;
+    const int64_t dead_ns =
+        !l->path && l->unheard_ns && !l->hung ? l->unheard_ns + DEAD_NS : OS_NEVER;
     return due_ns < dead_ns ? due_ns : dead_ns;
 }
 

@@ -23,9 +23,9 @@ enum line_fault {
     LINE_MERGED, // held back until the next answer, with which it comes
     LINE_BEFORE, // garbage in front
     LINE_AFTER,
-    LINE_FLIPPED,      // a bit; links with a checksum
-    LINE_DEAF,         // the request never arrives
-    LINE_WRONG_UNIT,   // Modbus, with a checksum that is right
+    LINE_FLIPPED,    // a bit; links with a checksum
+    LINE_DEAF,       // the request never arrives
+    LINE_WRONG_UNIT, // Modbus, with a checksum that is right
     LINE_WRONG_FUNCTION,
     LINE_STALE_NUMBER, // Modbus TCP: transaction of the request before
     LINE_WRONG_ECHO,   // of a write: another address
@@ -46,22 +46,22 @@ struct line {
     bool modbus;
     struct dice dice;
     // the connection
-    int fd; // -1: none
-    bool hung;        // pulled out, or closed by the other end
-    int reset;        // errno of the next read; 0: end of file when hung
-    bool away;        // cannot be opened
-    bool hole;        // bytes vanish, both ways
+    int fd;             // -1: none
+    bool hung;          // pulled out, or closed by the other end
+    int reset;          // errno of the next read; 0: end of file when hung
+    bool away;          // cannot be opened
+    bool hole;          // bytes vanish, both ways
     int64_t unheard_ns; // since when bytes vanish without an acknowledgement; 0: none
     // faults to come
     enum line_fault next;
-    int left;           // so many times
-    const char *number; // LINE_NO_NUMBER
-    int64_t late_ns;    // LINE_LATE, LINE_DOUBLED: by so much
-    bool stuck;         // text: lists of values are those of before
+    int left;                                  // so many times
+    const char *number;                        // LINE_NO_NUMBER
+    int64_t late_ns;                           // LINE_LATE, LINE_DOUBLED: by so much
+    bool stuck;                                // text: lists of values are those of before
     uint8_t kept[LINE_LISTS][PORT_REPLY_MOST]; // by the number of commas
     size_t kept_size[LINE_LISTS];
-    uint64_t hits;      // faults that struck
-    int64_t hit_ns;     // the last one
+    uint64_t hits;  // faults that struck
+    int64_t hit_ns; // the last one
     // bytes
     uint8_t command[300]; // the last that was written
     size_t command_size;
@@ -91,7 +91,7 @@ ssize_t line_write(struct line *l, const void *bytes, size_t size);
 ssize_t line_read(struct line *l, void *bytes, size_t size);
 void line_flush(struct line *l);
 short line_revents(struct line *l, short events);
-bool line_readable(void *line);       // at os.now_ns
+bool line_readable(void *line);   // at os.now_ns
 int64_t line_next_ns(void *line); // when that may change
 
 void line_disturb(struct line *l, enum line_fault fault, int times);

@@ -19,12 +19,12 @@ struct cell {
 static char letter_of(const struct trial_result *r)
 {
     const struct trial_seen *s = &r->seen;
-    return s->warned       ? 'w'
-           : s->operators  ? 'p'
-           : s->homings    ? 'h'
-           : s->flagged    ? 'x'
-           : s->returns    ? 'r'
-                           : '.';
+    return s->warned      ? 'w'
+           : s->operators ? 'p'
+           : s->homings   ? 'h'
+           : s->flagged   ? 'x'
+           : s->returns   ? 'r'
+                          : '.';
 }
 
 // Pauses and stops that the state itself is made of.
@@ -70,12 +70,14 @@ static void describe(struct cell *c, const struct trial_result *r)
 {
     const struct trial_seen *s = &r->seen;
     snprintf(c->text, sizeof c->text,
-             "%d pauses for an operator, %d that ended by themselves, %d flagged, %d homings%s%.200s%s%s",
+             "%d pauses for an operator, %d that ended by themselves, %d flagged, %d "
+             "homings%s%.200s%s%s",
              s->operators, s->returns, s->flagged, s->homings, *s->reason ? "; " : "", s->reason,
              r->violations ? "; BROKEN " : "", r->violations ? r->text : "");
 }
 
-static void judge(struct cell *c, const struct fault *f, enum trial_moment m, struct trial_result *r)
+static void judge(struct cell *c, const struct fault *f, enum trial_moment m,
+                  struct trial_result *r)
 {
     enum verdict v;
     if (!r->seen.begun)
@@ -152,9 +154,11 @@ static int report_row(const struct cell *row, const struct fault *f, FILE *out)
 
 static void explain(struct cell (*cells)[MOMENTS], FILE *out)
 {
-    fprintf(out, "\nfaults done, and the reaction seen: . goes on, r returns by itself, x flagged and read "
-                 "again,\nh homed again, p paused for an operator, w warned of the light; - nothing to "
-                 "be seen,\n! not what is listed, # a rule was broken, ? could not be done\n\nnot yet:\n");
+    fprintf(
+        out,
+        "\nfaults done, and the reaction seen: . goes on, r returns by itself, x flagged and read "
+        "again,\nh homed again, p paused for an operator, w warned of the light; - nothing to "
+        "be seen,\n! not what is listed, # a rule was broken, ? could not be done\n\nnot yet:\n");
     for (int i = 0; i < faults_count(); i++)
         if (faults[i].not_yet)
             fprintf(out, "  %-4s %s: %s\n", faults[i].id, faults[i].what, faults[i].not_yet);

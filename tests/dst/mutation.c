@@ -58,8 +58,22 @@ static void ignore_alarm(struct trial *t)
 static void send_axis(struct trial *t, int unit, double to)
 {
     const int32_t steps = (int32_t)(to * rig_steps_per_unit());
-    const uint16_t r[16] = {0, 0, 0, 1, (uint16_t)((uint32_t)steps >> 16), (uint16_t)steps,
-                            0, 60000, 9, 10176, 9, 10176, 0, 1000, 0, 1};
+    const uint16_t r[16] = {0,
+                            0,
+                            0,
+                            1,
+                            (uint16_t)((uint32_t)steps >> 16),
+                            (uint16_t)steps,
+                            0,
+                            60000,
+                            9,
+                            10176,
+                            9,
+                            10176,
+                            0,
+                            1000,
+                            0,
+                            1};
     sim_az_write(&t->rig.bench.az[unit], 0x58, 16, r, os.now_ns);
     watch_step(&t->watch, os.now_ns);
 }
@@ -137,14 +151,14 @@ static void calls_it_off(struct engine_event *e)
 static const struct mutation mutations[] = {
     {"light in a pause", "ON is sent while the campaign is paused", WATCH_EMISSION,
      "switched on while the campaign is paused", ROW, pause_and_switch_on, NULL, NULL, false},
-    {"hang", "0.8 s without renewing the lease", WATCH_EMISSION, "without a breath", ROW, hang, NULL,
-     NULL, false},
+    {"hang", "0.8 s without renewing the lease", WATCH_EMISSION, "without a breath", ROW, hang,
+     NULL, NULL, false},
     {"interlock", "ON takes effect with the interlock open", WATCH_EMISSION, "interlock open", ROW,
      interlock, NULL, NULL, false},
     {"alarm", "an axis's alarm is not looked at", WATCH_EMISSION, "after an alarm", ROW,
      ignore_alarm, NULL, NULL, false},
-    {"limits", "an axis is sent beyond its travel", WATCH_MOTION, "beyond", ROW, beyond_limits, NULL,
-     NULL, false},
+    {"limits", "an axis is sent beyond its travel", WATCH_MOTION, "beyond", ROW, beyond_limits,
+     NULL, NULL, false},
     {"unhomed", "an axis without home is sent somewhere", WATCH_MOTION, "not homed", ROW, unhomed,
      NULL, NULL, false},
     {"keep-out", "two axes are sent into a keep-out", WATCH_MOTION, "keep-out lamp", ROW,
@@ -161,10 +175,10 @@ static const struct mutation mutations[] = {
      changed_on_the_way, NULL, false},
     {"reason", "pauses give no reason", WATCH_WORDS, "without a reason", ROW, wait_for_ever, NULL,
      without_reason, false},
-    {"laser off", "it is called off while it is on", WATCH_WORDS, "with the light on", 0, NULL, NULL,
-     calls_it_off, false},
-    {"for ever", "a pause that nobody ends", WATCH_WORDS, "no reading for", ROW, wait_for_ever, NULL,
-     NULL, false},
+    {"laser off", "it is called off while it is on", WATCH_WORDS, "with the light on", 0, NULL,
+     NULL, calls_it_off, false},
+    {"for ever", "a pause that nobody ends", WATCH_WORDS, "no reading for", ROW, wait_for_ever,
+     NULL, NULL, false},
 };
 
 void mutation_after_row(struct trial *t)

@@ -22,12 +22,12 @@ double rig_steps_per_unit(void)
 void rig_draw(struct rig_spec *ret_spec, uint64_t seed)
 {
     struct dice d = dice_of(seed, 1);
-    *ret_spec = (struct rig_spec){.seed = seed,
-                                  .controller = dice_below(&d, 4) == 0 ? BENCH_LEADSHINE : BENCH_AZ,
-                                  .tcp = {dice_below(&d, 2) != 0, dice_below(&d, 3) == 0,
-                                          dice_below(&d, 3) == 0},
-                                  .keep_out = dice_below(&d, 3) == 0,
-                                  .time_constant_s = dice_below(&d, 2) ? 0.01 : 0.003};
+    *ret_spec = (struct rig_spec){
+        .seed = seed,
+        .controller = dice_below(&d, 4) == 0 ? BENCH_LEADSHINE : BENCH_AZ,
+        .tcp = {dice_below(&d, 2) != 0, dice_below(&d, 3) == 0, dice_below(&d, 3) == 0},
+        .keep_out = dice_below(&d, 3) == 0,
+        .time_constant_s = dice_below(&d, 2) ? 0.01 : 0.003};
 }
 
 // --- a controller that misbehaves ----------------------------------------------------------------
@@ -78,7 +78,7 @@ static int32_t target_of(const uint16_t *registers)
 
 // AZ: direct data operation. What goes nowhere slips nowhere.
 static bool is_move(const struct rig_gate *g, int address, int count, const uint16_t *registers,
-                        int64_t t_ns)
+                    int64_t t_ns)
 {
     if (g->rig->spec.controller != BENCH_AZ || address != 0x0058 || count != 16)
         return false;
@@ -144,25 +144,27 @@ static void write_text(struct rig *r)
     link_of(s, RIG_LASER, laser, sizeof laser);
     link_of(s, RIG_DETECTOR, detector, sizeof detector);
     used += (size_t)axis_text(s, 1, "theta_i", "deg", -5, 88, 0.02, axes, sizeof axes);
-    used += (size_t)axis_text(s, 2, "theta_r", "deg", -91, 181, 0.02, axes + used,
-                              sizeof axes - used);
+    used +=
+        (size_t)axis_text(s, 2, "theta_r", "deg", -91, 181, 0.02, axes + used, sizeof axes - used);
     axis_text(s, 3, "sample", "mm", 0, 30, 0, axes + used, sizeof axes - used);
-    snprintf(r->bench_text, sizeof r->bench_text,
-             "bench: { name = \"simulation\"; wavelength_nm = 1060.0; regime = \"underfilled\";\n"
-             "  aperture_radius_mm = 8.0; u_aperture_radius_mm = 0.004;\n  distance_mm = 500.0; u_distance_mm = 0.25; };\n"
-             "buses: ( { name = \"axes\"; link = \"%s\"; timeout_ms = 100; } );\n"
-             "axes: (\n%s );\n"
-             "laser: { driver = \"cobolt-05\"; link = \"%s\"; power_w = 0.05; warmup_s = %.1f;\n"
-             "  polarisation = \"u\"; };\n"
-             "detector: { driver = \"sr830\"; link = \"%s\"; time_constant_s = %.3f;\n"
-             "  slope_db = 12; monitor_aux = 1; };\n"
-             "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; sample_mm = "
-             "30.0; },\n  { name = \"park\"; theta_i_deg = 0.0; theta_r_deg = 0.0; sample_mm = 0.0; "
-             "} );\n%s",
-             bus, axes, laser, WARMUP_S / 2, detector, s->time_constant_s,
-             s->keep_out ? "keep_out: ( { name = \"lamp\"; polygon = ( (60.0, -40.0), (70.0, "
-                           "-40.0), (70.0, -30.0), (60.0, -30.0) ); } );\n"
-                         : "");
+    snprintf(
+        r->bench_text, sizeof r->bench_text,
+        "bench: { name = \"simulation\"; wavelength_nm = 1060.0; regime = \"underfilled\";\n"
+        "  aperture_radius_mm = 8.0; u_aperture_radius_mm = 0.004;\n  distance_mm = 500.0; "
+        "u_distance_mm = 0.25; };\n"
+        "buses: ( { name = \"axes\"; link = \"%s\"; timeout_ms = 100; } );\n"
+        "axes: (\n%s );\n"
+        "laser: { driver = \"cobolt-05\"; link = \"%s\"; power_w = 0.05; warmup_s = %.1f;\n"
+        "  polarisation = \"u\"; };\n"
+        "detector: { driver = \"sr830\"; link = \"%s\"; time_constant_s = %.3f;\n"
+        "  slope_db = 12; monitor_aux = 1; };\n"
+        "stations: ( { name = \"beam\"; theta_i_deg = 0.0; theta_r_deg = 180.0; sample_mm = "
+        "30.0; },\n  { name = \"park\"; theta_i_deg = 0.0; theta_r_deg = 0.0; sample_mm = 0.0; "
+        "} );\n%s",
+        bus, axes, laser, WARMUP_S / 2, detector, s->time_constant_s,
+        s->keep_out ? "keep_out: ( { name = \"lamp\"; polygon = ( (60.0, -40.0), (70.0, "
+                      "-40.0), (70.0, -30.0), (60.0, -30.0) ); } );\n"
+                    : "");
 }
 
 void rig_init(struct rig *r, const struct rig_spec *spec)
@@ -184,10 +186,9 @@ void rig_init(struct rig *r, const struct rig_spec *spec)
         gate_init(r, i);
     static const enum bench_port ports[RIG_LINES] = {BENCH_AXES_RTU, BENCH_LASER, BENCH_DETECTOR};
     for (int i = 0; i < RIG_LINES; i++) {
-        line_init(&r->line[i], names[i], spec->tcp[i] ? NULL : paths[i],
-                  0xc0000200u + (uint32_t)i + 1,
-                  bench_port(&r->bench, ports[i] + (spec->tcp[i] ? 1 : 0)), i == RIG_BUS,
-                  spec->seed);
+        line_init(
+            &r->line[i], names[i], spec->tcp[i] ? NULL : paths[i], 0xc0000200u + (uint32_t)i + 1,
+            bench_port(&r->bench, ports[i] + (spec->tcp[i] ? 1 : 0)), i == RIG_BUS, spec->seed);
         libc_add_line(&r->line[i]);
     }
     write_text(r);

@@ -17,9 +17,9 @@ struct rig_gate { // between a Modbus unit and its registers
     int exception, exceptions; // the next so many requests are refused with it
     bool frozen;               // the encoder stands still
     uint16_t frozen_at[2];
-    bool never_done;           // it says that it moves
-    bool hides_alarm;          // AZ
-    int misses;                // the next moves end somewhere else
+    bool never_done;  // it says that it moves
+    bool hides_alarm; // AZ
+    int misses;       // the next moves end somewhere else
     int32_t miss_steps;
 };
 
@@ -44,6 +44,6 @@ void rig_draw(struct rig_spec *ret_spec, uint64_t seed); // what kind of bench a
 void rig_init(struct rig *r, const struct rig_spec *spec);
 const char *rig_describe(const struct rig *r, char *text, size_t size);
 
-void rig_step(struct rig *r); // what goes on all the time
+void rig_step(struct rig *r);        // what goes on all the time
 bool rig_emits(const struct rig *r); // or is on its way: light may come at any moment
 double rig_steps_per_unit(void);

@@ -44,12 +44,10 @@ static void step(void *ctx, int arg)
 void shop_begin(struct shop *s, const struct bench_config *bench, const char *bench_text,
                 struct mail *to_runner, struct mail *to_main)
 {
-    *s = (struct shop){.inbox = mail_new(),
-                       .answers = mail_new(),
-                       .to_runner = to_runner,
-                       .to_main = to_main};
-    s->links = (struct storer_links){clk_system(), bench,   bench_text, ".",
-                                     s->inbox,     to_main, s->answers};
+    *s = (struct shop){
+        .inbox = mail_new(), .answers = mail_new(), .to_runner = to_runner, .to_main = to_main};
+    s->links =
+        (struct storer_links){clk_system(), bench, bench_text, ".", s->inbox, to_main, s->answers};
     s->core = storer_new(&s->links);
     if (!s->inbox || !s->answers || !s->core)
         abort();

@@ -15,9 +15,9 @@
 #define SPAN_DEG 170.0
 #define NOTHING_NS OS_S(3 * 3600) // without a reading
 
-const char *const trial_moment_names[MOMENTS] = {"idle",     "preparing", "warming",
-                                                 "moving",   "settling",  "sampling",
-                                                 "storing",  "paused",    "stopping"};
+const char *const trial_moment_names[MOMENTS] = {"idle",    "preparing", "warming",
+                                                 "moving",  "settling",  "sampling",
+                                                 "storing", "paused",    "stopping"};
 
 static void complain(void *ctx, const char *line)
 {
@@ -40,8 +40,8 @@ static void write_campaign(const struct trial_spec *spec, char *text, size_t siz
     const int most = spec->readings / 40 < 80 ? spec->readings / 40 : 80;
     const int sweeps = most < 2 ? 1 : most / 2 + (int)dice_below(&d, (unsigned)most / 2 + 1);
     const double step = SPAN_DEG / fmax(spec->readings / sweeps - 1, 2);
-    size_t used = (size_t)snprintf(text, size,
-                                   "campaign: { name = \"dst\"; sample = \"paint\"; theta_i_deg = (");
+    size_t used = (size_t)snprintf(
+        text, size, "campaign: { name = \"dst\"; sample = \"paint\"; theta_i_deg = (");
     for (int i = 0; i < sweeps; i++)
         used += (size_t)snprintf(text + used, size - used, "%s%.2f", i ? ", " : "",
                                  sweeps > 1 ? 80.0 * i / (sweeps - 1) : 30.0);

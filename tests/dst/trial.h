@@ -33,9 +33,9 @@ extern const char *const trial_moment_names[MOMENTS];
 
 struct trial_spec {
     uint64_t seed;
-    int readings; // points of the plan, nearly
-    const char *profiles; // the folder whose profiles/ has the instruments'; absolute
-    double faults_per_1000; // readings, at random
+    int readings;               // points of the plan, nearly
+    const char *profiles;       // the folder whose profiles/ has the instruments'; absolute
+    double faults_per_1000;     // readings, at random
     const struct rig_spec *rig; // NULL: drawn
     int fault;                  // one of the table, at a moment; -1: none
     enum trial_moment moment;
@@ -50,8 +50,8 @@ struct trial_seen {
     int operators, returns; // pauses that an operator ended, and those that ended by themselves
     int flagged, homings;
     int stops;
-    bool warned, told;   // told: the fault's words were in a pause's reason
-    char reason[300];    // of the first pause
+    bool warned, told; // told: the fault's words were in a pause's reason
+    char reason[300];  // of the first pause
 };
 
 struct trial {
@@ -83,7 +83,7 @@ struct trial {
     int64_t paused_ns; // since when
     int counts[TRIAL_FAULTS];
     int injected, last_fault;
-    bool aimed;     // at its moment: on the agenda
+    bool aimed; // at its moment: on the agenda
     bool asked;
     int64_t ask_ns; // when a pause or a stop is to be asked for, for its moment
     struct trial_seen seen;

@@ -211,15 +211,15 @@ static bool take_pause(void *ctx)
 
 void trial_ports(struct trial *t, struct engine_ports *ret_ports)
 {
-    *ret_ports = (struct engine_ports){.ctx = t,
-                                       .clk = clk_system(),
-                                       .cancel = t->cancel,
-                                       .opening =
-                                           t->material->has_opening ? &t->material->opening : NULL,
-                                       .store_reading = store_reading,
-                                       .store_event = store_event,
-                                       .publish = publish,
-                                       .request_fit = request_fit,
-                                       .take_resume = take_resume,
-                                       .take_pause = take_pause};
+    *ret_ports =
+        (struct engine_ports){.ctx = t,
+                              .clk = clk_system(),
+                              .cancel = t->cancel,
+                              .opening = t->material->has_opening ? &t->material->opening : NULL,
+                              .store_reading = store_reading,
+                              .store_event = store_event,
+                              .publish = publish,
+                              .request_fit = request_fit,
+                              .take_resume = take_resume,
+                              .take_pause = take_pause};
 }

@@ -9,16 +9,15 @@
 #include <string.h>
 
 #define LEASE_NS OS_MS(500)
-#define REST_NS OS_S(8)    // until a laser that can be reached is off at rest: its reopening is paced
-#define ALARM_NS OS_S(12)  // until an axis's alarm is noticed: at the latest when the store answered
-#define LOST_NS OS_S(1)    // a command that was on its way when home was lost
-#define STOP_NS OS_S(1.5)  // an ON that was on its way when a stop came
+#define REST_NS OS_S(8) // until a laser that can be reached is off at rest: its reopening is paced
+#define ALARM_NS OS_S(12) // until an axis's alarm is noticed: at the latest when the store answered
+#define LOST_NS OS_S(1)   // a command that was on its way when home was lost
+#define STOP_NS OS_S(1.5) // an ON that was on its way when a stop came
 #define STOPPED_NS OS_S(8) // until a laser that can be reached is off after a stop
 #define ASKED_NS OS_S(2)   // from the axes' answers to ON: the laser is asked many things before
 #define PATH_NS OS_MS(5)
 
-const char *const watch_rule_names[WATCH_RULES] = {"emission", "motion", "values", "rows",
-                                                   "words"};
+const char *const watch_rule_names[WATCH_RULES] = {"emission", "motion", "values", "rows", "words"};
 
 void watch_init(struct watch *w, struct rig *rig, const struct bench_config *bench,
                 const struct plan *plan)
@@ -130,8 +129,10 @@ static void look_at_light(struct watch *w, int64_t t_ns)
     if (w->running && at_rest(w->state) && t_ns > due_ns)
         watch_violate(w, WATCH_EMISSION, "still on %.1f s after %s, and the laser can be reached",
                       (double)(t_ns - w->state_ns) * 1e-9, run_state_name(w->state));
-    if (w->stop && t_ns > later(w->stop_ns, w->laser_hit_ns) + STOPPED_NS && t_ns > w->forced_ns + REST_NS)
-        watch_violate(w, WATCH_EMISSION, "on %.1f s after a stop", (double)(t_ns - w->stop_ns) * 1e-9);
+    if (w->stop && t_ns > later(w->stop_ns, w->laser_hit_ns) + STOPPED_NS &&
+        t_ns > w->forced_ns + REST_NS)
+        watch_violate(w, WATCH_EMISSION, "on %.1f s after a stop",
+                      (double)(t_ns - w->stop_ns) * 1e-9);
     for (int i = 0; i < RIG_AXES; i++)
         if (w->alarm_ns[i] != OS_NEVER &&
             t_ns > later(w->alarm_ns[i] + ALARM_NS, w->laser_hit_ns + REST_NS))
@@ -178,13 +179,17 @@ static void commanded(struct watch *w, int i, int64_t t_ns)
     const bool homing = b->controller == BENCH_AZ ? b->az[i].homing : b->leadshine[i].homing;
     const double left_s = motion_left_s(m, t_ns > m->start_ns ? t_ns : m->start_ns);
     const int64_t end_ns = later(t_ns, m->start_ns) + OS_S(left_s) + 1;
-    const double to = motion_at(m, end_ns).motor, slack = (2.0 + abs(w->rig->gate[i].miss_steps)) / rig_steps_per_unit(); // a drive that misses does so by itself
+    const double to = motion_at(m, end_ns).motor,
+                 slack = (2.0 + abs(w->rig->gate[i].miss_steps)) /
+                         rig_steps_per_unit(); // a drive that misses does so by itself
     w->moving_until_ns = later(w->moving_until_ns, end_ns);
     if (w->forced_ns == t_ns || isnan(m->end) || homing) // a fault, a stop, or homing
         return;
     if (!w->is_homed[i] && t_ns > w->unhomed_ns[i] + LOST_NS)
-        watch_violate(w, WATCH_MOTION, "%s moves to %.3f and is not homed", world_axis_names[i], to);
-    if (w->is_homed[i] && (to < w->bench->axes[i].min - slack || to > w->bench->axes[i].max + slack))
+        watch_violate(w, WATCH_MOTION, "%s moves to %.3f and is not homed", world_axis_names[i],
+                      to);
+    if (w->is_homed[i] &&
+        (to < w->bench->axes[i].min - slack || to > w->bench->axes[i].max + slack))
         watch_violate(w, WATCH_MOTION, "%s is sent to %.3f, beyond %.1f..%.1f", world_axis_names[i],
                       to, w->bench->axes[i].min, w->bench->axes[i].max);
 }

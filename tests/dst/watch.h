@@ -24,7 +24,14 @@
 
 enum { WATCH_SAMPLES = 64, WATCH_TEXT = 300 };
 
-enum watch_rule { WATCH_EMISSION, WATCH_MOTION, WATCH_VALUES, WATCH_ROWS, WATCH_WORDS, WATCH_RULES };
+enum watch_rule {
+    WATCH_EMISSION,
+    WATCH_MOTION,
+    WATCH_VALUES,
+    WATCH_ROWS,
+    WATCH_WORDS,
+    WATCH_RULES
+};
 
 extern const char *const watch_rule_names[WATCH_RULES];
 
@@ -65,7 +72,7 @@ struct watch {
     unsigned char *accepted; // by index in the plan
     // found
     int violations[WATCH_RULES], all;
-    char text[WATCH_TEXT]; // the first
+    char text[WATCH_TEXT];               // the first
     char texts[WATCH_RULES][WATCH_TEXT]; // the first of each
 };
 

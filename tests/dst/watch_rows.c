@@ -93,17 +93,19 @@ static bool choose(struct choice *c, int at, int have, double sum_v)
 static void check_place(struct watch *w, const struct store_reading *row,
                         const struct plan_point *p, const struct watch_sample *s)
 {
-    const double at[2] = {units_deg_of_udeg(row->theta_i_udeg), units_deg_of_udeg(row->theta_r_udeg)};
+    const double at[2] = {units_deg_of_udeg(row->theta_i_udeg),
+                          units_deg_of_udeg(row->theta_r_udeg)};
     const double plan[2] = {p->theta_i_deg, p->theta_r_deg};
     if (!s->still)
-        watch_violate(w, WATCH_VALUES, "sweep %d, point %d was read while an axis moved", row->sweep,
-                      row->point);
+        watch_violate(w, WATCH_VALUES, "sweep %d, point %d was read while an axis moved",
+                      row->sweep, row->point);
     for (int i = 0; i < 2; i++) {
-        const double step = w->rig->gate[i].frozen ? PLAN_DEG : STEP_DEG; // it stopped on its way in
+        const double step =
+            w->rig->gate[i].frozen ? PLAN_DEG : STEP_DEG; // it stopped on its way in
         if (fabs(s->motor[i] - at[i]) > step || fabs(s->load[i] - at[i]) > PLAY_DEG)
-            watch_violate(w, WATCH_VALUES, "sweep %d, point %d says %s %.4f, it was %.4f (load %.4f)",
-                          row->sweep, row->point, world_axis_names[i], at[i], s->motor[i],
-                          s->load[i]);
+            watch_violate(w, WATCH_VALUES,
+                          "sweep %d, point %d says %s %.4f, it was %.4f (load %.4f)", row->sweep,
+                          row->point, world_axis_names[i], at[i], s->motor[i], s->load[i]);
         if (p->kind != PLAN_DARK && fabs(at[i] - plan[i]) > PLAN_DEG)
             watch_violate(w, WATCH_VALUES, "sweep %d, point %d was read at %s %.4f instead of %.4f",
                           row->sweep, row->point, world_axis_names[i], at[i], plan[i]);
@@ -126,8 +128,9 @@ static void check_truth(struct watch *w, const struct store_reading *row, double
         watch_violate(w, WATCH_VALUES, "sweep %d, point %d is %.6g V where the world has %.6g V",
                       row->sweep, row->point, row->signal_v, truth_v);
     if (fabs(row->monitor_v - monitor_v) > 0.002 + 0.002 * monitor_v)
-        watch_violate(w, WATCH_VALUES, "sweep %d, point %d: monitor %.5g V where the world has %.5g V",
-                      row->sweep, row->point, row->monitor_v, monitor_v);
+        watch_violate(w, WATCH_VALUES,
+                      "sweep %d, point %d: monitor %.5g V where the world has %.5g V", row->sweep,
+                      row->point, row->monitor_v, monitor_v);
 }
 
 void watch_offered(struct watch *w, const struct store_reading *row)
@@ -175,7 +178,8 @@ void watch_acknowledged(struct watch *w, const struct store_reading *row)
     }
     w->row[w->rows++] = *row;
     if (planned(w, row->sweep, row->point, &index) && is_accepted(row) && w->accepted[index]++)
-        watch_violate(w, WATCH_ROWS, "sweep %d, point %d was accepted twice", row->sweep, row->point);
+        watch_violate(w, WATCH_ROWS, "sweep %d, point %d was accepted twice", row->sweep,
+                      row->point);
 }
 
 // --- the file ------------------------------------------------------------------------------------
@@ -190,10 +194,11 @@ static int by_place(const void *a, const void *b)
 
 static bool same(const struct store_reading *a, const struct store_reading *b)
 {
-    return by_place(a, b) == 0 && a->t_utc_ms == b->t_utc_ms && a->theta_i_udeg == b->theta_i_udeg &&
-           a->theta_r_udeg == b->theta_r_udeg && a->signal_v == b->signal_v &&
-           a->signal_sd_v == b->signal_sd_v && a->monitor_v == b->monitor_v &&
-           a->count == b->count && a->range == b->range && a->flags == b->flags;
+    return by_place(a, b) == 0 && a->t_utc_ms == b->t_utc_ms &&
+           a->theta_i_udeg == b->theta_i_udeg && a->theta_r_udeg == b->theta_r_udeg &&
+           a->signal_v == b->signal_v && a->signal_sd_v == b->signal_sd_v &&
+           a->monitor_v == b->monitor_v && a->count == b->count && a->range == b->range &&
+           a->flags == b->flags;
 }
 
 void watch_file(struct watch *w, const struct store_reading *rows, int count)
