@@ -3,7 +3,7 @@
 #   make                 the three programs            make demo     a whole campaign on the simulated bench
 #   make check           unit and system tests         make layers   who may include whom
 #   make bench           what things cost, as a table and in build/bench.json
-#   make check-slow      statistics of the fit's intervals (minutes)
+#   make check-slow      statistics of the fit's intervals, bad lines, simulated campaigns (minutes)
 #   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
 #
 # A variant is a compiler and its flags: release, clang, asan, debug. VARIANT=asan make check.

@@ -130,7 +130,7 @@ static int axis_text(const struct rig_spec *s, int unit, const char *name, const
     return snprintf(text, size,
                     "%s  { name = \"%s\"; driver = \"%s\"; bus = \"axes\"; unit = %d;\n"
                     "    unit_name = \"%s\"; steps_per_unit = %.1f; min = %.1f; max = %.1f;\n"
-                    "    speed = 60.0; acceleration = 600.0; backlash = %.3f; deadband = 0.003; }",
+                    "    speed = 200.0; acceleration = 10000.0; backlash = %.3f; deadband = 0.003; }",
                     unit > 1 ? ",\n" : "", name, bench_controllers[s->controller], unit, unit_name,
                     STEPS_PER_UNIT, min, max, backlash);
 }

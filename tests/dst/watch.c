@@ -15,7 +15,7 @@
 #define STOP_NS OS_S(1.5) // an ON that was on its way when a stop came
 #define STOPPED_NS OS_S(8) // until a laser that can be reached is off after a stop
 #define ASKED_NS OS_S(2)   // from the axes' answers to ON: the laser is asked many things before
-#define PATH_NS OS_MS(5)
+#define PATH_NS OS_MS(1)
 
 const char *const watch_rule_names[WATCH_RULES] = {"emission", "motion", "values", "rows", "words"};
 
