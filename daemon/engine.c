@@ -240,7 +240,8 @@ static int prepare(struct engine *e)
     e->ready = rc >= 0;
     e->pace_ns = 0;
     instrument_permit(e->in, e->ready);
-    e->acquire = (struct acquire){.range = -1, .set_up = true}; // whoever was there may have turned it
+    e->acquire =
+        (struct acquire){.range = -1, .set_up = true}; // whoever was there may have turned it
     return rc;
 }
 
@@ -295,18 +296,6 @@ static double least_monitor_v(const struct engine *e)
                                        : dark_v + MONITOR_LOST * (e->monitor_lit_v - dark_v);
 }
 
-// What was read belongs to where the axes stood all the time; where that is not known it is kept, and
-// made again.
-static int verify_place(struct engine *e, const struct travel_pose *at, struct acquire_reading *r)
-{
-    const int rc = travel_still(e->in, at, &e->why);
-    if (rc < 0) {
-        r->flags |= rc == GON_E_DEVICE ? STORE_MOVED : STORE_DISCARDED;
-        r->accepted = false;
-    }
-    return rc;
-}
-
 static int measure(struct engine *e, const struct travel_pose *at)
 {
     const struct acquire_wish wish = {readings_of(e), e->light_ns, least_monitor_v(e)};
@@ -318,7 +307,7 @@ static int measure(struct engine *e, const struct travel_pose *at)
         if (rc < 0)
             return rc;
         e->attempt++;
-        const int still = verify_place(e, at, &r);
+        const int sure = engine_verify(e, at, &r);
         const struct gon_error why = e->why;
         const struct store_reading row = row_of(e, &r, at);
         rc = store(e, &row);
@@ -330,9 +319,9 @@ static int measure(struct engine *e, const struct travel_pose *at)
             begin_pace(e);
         }
         publish_reading(e, &r, at);
-        if (still < 0) {
+        if (sure < 0) {
             e->why = why;
-            return still;
+            return sure;
         }
         if (r.accepted || !r.again)
             break;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_light.c (the
-// laser's part) and engine_elements.c (the elements of polarisation) share; nobody else includes
-// it.
+// laser's part), engine_elements.c (the elements of polarisation) and engine_verify.c (whether a
+// reading is one) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
 
 struct plan_point;
+struct travel_pose;
 
 struct engine {
     const struct engine_ports *ports;
@@ -43,8 +44,8 @@ void engine_say(struct engine *e, enum engine_event_kind kind, const char *level
 void engine_enter(struct engine *e, enum run_state state, const char *text);
 
 // --- engine_pause.c ---
-int engine_canceled(struct engine *e);        // GON_E_CANCELED
-int engine_nap(struct engine *e, int64_t ns); // GON_E_CANCELED
+int engine_canceled(struct engine *e);                 // GON_E_CANCELED
+int engine_nap(struct engine *e, int64_t ns);          // GON_E_CANCELED
 const char *engine_light_text(const struct engine *e); // what may be said of the laser
 void engine_make_safe(struct engine *e);               // emission off, axes stopped
 // RUN_PAUSED; where the laser is not known to be off the text begins with that.
@@ -57,6 +58,11 @@ int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
 // --- engine_elements.c ---
 // To the point's states; what stands there already is only looked at, now and then.
 int engine_turn_elements(struct engine *e);
+
+// --- engine_verify.c ---
+// At the end of a reading: the axes stand where they stood, and a dark was dark. Otherwise the
+// reading is flagged, not accepted, and this is the error of the run.
+int engine_verify(struct engine *e, const struct travel_pose *at, struct acquire_reading *r);
 
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.

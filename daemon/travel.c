@@ -178,7 +178,8 @@ static int home_one(struct instrument *in, enum instrument_part part, const stru
     int64_t moved_ns = 0;
     for (int begun = 0; rc >= 0;) {
         // It stands and is not homed: it was not told yet, or restarted on the way.
-        if (begun == 0 || (begun < HOME_TRIES && instrument_now_ns(in) - moved_ns > HOME_STOOD_NS)) {
+        if (begun == 0 ||
+            (begun < HOME_TRIES && instrument_now_ns(in) - moved_ns > HOME_STOOD_NS)) {
             rc = begin_homing(in, part, err);
             moved_ns = instrument_now_ns(in);
             begun++;

@@ -31,8 +31,8 @@ struct travel_pose {
 // not). Axes that need not move are asked at least each INSTRUMENT_FRESH_MS.
 int travel_move(struct instrument *in, const struct travel_pose *target,
                 const struct cancel *cancel, struct travel_pose *ret_actual, struct gon_error *err);
-// Asks all axes: without alarm, homed, and still standing there within their deadbands (NAN: wherever
-// it is). GON_E_DEVICE: one moved by itself, or has an alarm.
+// Asks all axes: without alarm, homed, and still standing there within their deadbands (NAN:
+// wherever it is). GON_E_DEVICE: one moved by itself, or has an alarm.
 int travel_still(struct instrument *in, const struct travel_pose *at, struct gon_error *err);
 struct travel_pose travel_stay(void); // all axes where they are
 // The sample in, and the axes where kinematics puts that geometry; GON_E_INPUT when it cannot be.

@@ -107,7 +107,7 @@ static inline void keep(struct run *r, const struct store_reading *row)
     if (r->rows > 0 && is_accepted(&r->row[r->rows - 1]) &&
         p == point_of(r, r->row[r->rows - 1].sweep, r->row[r->rows - 1].point))
         violate(r, "a point was measured again after it was accepted");
-    if (p->kind == PLAN_DARK && emits(r))
+    if (p->kind == PLAN_DARK && is_accepted(row) && emits(r))
         violate(r, "a dark with the laser on");
     if (p->kind != PLAN_DARK && is_accepted(row) && r->state != RUN_PAUSED && !emits(r))
         violate(r, "light was expected");

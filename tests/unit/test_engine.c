@@ -245,9 +245,9 @@ static void all_that_is_unplugged_is_named_and_the_light_comes_first(void **stat
     r->on_row = unplug_laser_and_axes_at_row_13;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_string_equal(r->pauses[0],
-                        "LASER MAY BE ON: use its key or the interlock; axis theta_i, axis theta_r, "
-                        "axis sample, laser: unplugged; waiting for them to come back");
+    assert_string_equal(
+        r->pauses[0], "LASER MAY BE ON: use its key or the interlock; axis theta_i, axis theta_r, "
+                      "axis sample, laser: unplugged; waiting for them to come back");
     end(r);
 }
 
@@ -853,6 +853,29 @@ static void the_detector_is_set_up_again_after_a_pause(void **state)
     end(r);
 }
 
+static void light_by_itself_in_the_dark(struct run *r)
+{
+    if (r->strayed || r->b.range != 26) // the first range of a reading
+        return;
+    r->strayed = true;
+    world_see(&r->b.world, r->b.clk.t_ns);
+    sim_laser_start(&r->b.world.laser, true);
+}
+
+static void a_dark_with_light_that_came_by_itself_is_none(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_time = light_by_itself_in_the_dark;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_true(r->strayed);
+    assert_complete(r);
+    assert_int_equal(r->row[0].flags & STORE_DISCARDED, STORE_DISCARDED);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "laser: emits although it was switched off"));
+    end(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -880,6 +903,7 @@ int main(void)
         cmocka_unit_test(nonsense_is_asked_again_and_in_the_end_somebody_is),
         cmocka_unit_test(a_restarted_controller_is_homed_again_in_the_dark),
         cmocka_unit_test(an_off_that_is_not_confirmed_is_repeated_until_it_is),
+        cmocka_unit_test(a_dark_with_light_that_came_by_itself_is_none),
         cmocka_unit_test(the_detector_is_set_up_again_after_a_pause),
         cmocka_unit_test(an_off_is_repeated_also_while_the_store_is_waited_for),
         cmocka_unit_test(an_alarm_while_the_laser_warms_up_pauses),
