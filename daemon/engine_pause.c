@@ -75,9 +75,9 @@ static int name_lost(const struct engine *e, char *text, size_t size)
         next = next_lost(&s, i + 1);
         const bool shared = next < PART_COUNT && !strcmp(p->address, s.part[next].address);
         const bool told = *p->address && !shared;
-        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s", lost++ ? ", " : "",
-                                   i < INSTRUMENT_AXES ? "axis " : "", p->name, told ? " (" : "",
-                                   told ? p->address : "", told ? ")" : "");
+        length += (size_t)snprintf(text + length, size - length, "%s%s%s%s%s%s",
+                                   lost++ ? ", " : "", i < INSTRUMENT_AXES ? "axis " : "", p->name,
+                                   told ? " (" : "", told ? p->address : "", told ? ")" : "");
     }
     return lost;
 }
