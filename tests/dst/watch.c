@@ -126,7 +126,8 @@ static void look_at_light(struct watch *w, int64_t t_ns)
         watch_violate(w, WATCH_EMISSION, "on for %.3f s without a breath",
                       (double)(t_ns - w->breath_ns) * 1e-9);
     const int64_t due_ns = later(later(w->state_ns, w->laser_hit_ns), w->forced_ns) + REST_NS;
-    if (w->running && at_rest(w->state) && t_ns > due_ns)
+    const bool light = sim_laser_emits(&w->rig->bench.world.laser); // not only on its way
+    if (w->running && at_rest(w->state) && light && t_ns > due_ns)
         watch_violate(w, WATCH_EMISSION, "still on %.1f s after %s, and the laser can be reached",
                       (double)(t_ns - w->state_ns) * 1e-9, run_state_name(w->state));
     if (w->stop && t_ns > later(w->stop_ns, w->laser_hit_ns) + STOPPED_NS &&
