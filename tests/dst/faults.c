@@ -110,7 +110,7 @@ const struct fault faults[] = {
      "goes on, with the light on all the time: nothing looks at CLOCK_BOOTTIME", false},
     {"H3", "disk full", REACT_RETURNS, 0, 0, fault_fill_disk, fault_mend_disk, 20, "store", NULL,
      false},
-    {"H4", "disk broken", REACT_RETURNS, 0, 0, fault_break_disk, fault_mend_disk, 20, "store", NULL,
+    {"H4", "disk broken", REACT_RETURNS, 0, 0, fault_break_disk, fault_mend_disk, 2.5, "store", NULL,
      false},
     {"op", "pause by the operator", REACT_PAUSES, 0, 0, fault_pause_by_hand, NULL, 0, "operator",
      NULL, false},
