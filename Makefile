@@ -3,7 +3,7 @@
 #   make                 the four programs             make demo     a whole campaign on the simulated bench
 #   make check           unit and system tests         make layers   who may include whom
 #   make bench           what things cost, as a table and in build/bench.json
-#   make check-slow      statistics of the fit's intervals, faults of links, power cuts, deaths (minutes)
+#   make check-slow      statistics of the fit's intervals, faults of links, power cuts, simulated campaigns, deaths
 #   make coverage-guard  every branch of what decides that a laser goes off
 #   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
 #
@@ -123,7 +123,16 @@ $(B)/tests/$(1): $(B)/obj/tests/slow/$(1).o $(patsubst %,$(B)/lib%.a,$(call slow
 endef
 $(foreach t,$(SLOW_TESTS),$(eval $(call slow_rules,$(t))))
 
-check-slow: $(SLOW_TESTS:%=$(B)/tests/%)
+# tests/dst: one program that simulates whole campaigns in virtual time, with libc's calls its own.
+DST_OBJ := $(patsubst %.c,$(B)/obj/%.o,$(wildcard tests/dst/*.c))
+DST_USES := $(shell sed -n 's,^// uses: *,,p' tests/dst/main.c)
+OBJECTS += $(DST_OBJ)
+$(B)/tests/dst: $(DST_OBJ) $(DST_USES:%=$(B)/lib%.a)
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(call libs_of,$(DST_USES))
+
+check-slow: $(SLOW_TESTS:%=$(B)/tests/%) $(B)/tests/dst
 	$(Q)set -e; for t in $^; do $$t; done
 	$(Q)$(MAKE) --no-print-directory check-deaths
 

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 // What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_light.c (the
-// laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
-// filter wheels and the like) share; nobody else includes it.
+// laser's part), engine_elements.c (the elements of polarisation), engine_devices.c (shutters,
+// filter wheels and the like) and engine_verify.c (whether a reading is one) share; nobody else
+// includes it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
 
 struct plan_point;
+struct travel_pose;
 
 struct engine {
     const struct engine_ports *ports;
@@ -74,6 +76,11 @@ int engine_seek_device(struct engine *e);
 // The shutter that makes the darks, if there is one: closed, and no light behind it.
 bool engine_shutter_darkens(const struct engine *e);
 int engine_shut(struct engine *e);
+
+// --- engine_verify.c ---
+// At the end of a reading: the axes stand where they stood, and a dark was dark. Otherwise the
+// reading is flagged, not accepted, and this is the error of the run.
+int engine_verify(struct engine *e, const struct travel_pose *at, struct acquire_reading *r);
 
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.

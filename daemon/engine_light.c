@@ -4,6 +4,7 @@
 #include "campaign/bench.h"
 #include "campaign/plan.h"
 #include "daemon/instrument_devices.h"
+#include "daemon/travel.h"
 
 #include <math.h>
 
@@ -63,6 +64,13 @@ int engine_watch_laser(struct engine *e)
     return rc < 0 || on ? rc : engine_check_laser(e);
 }
 
+// Nothing moves while it warms up, but an axis in alarm must not stay in the light until then.
+static int check_axes(struct engine *e)
+{
+    const struct travel_pose anywhere = travel_stay();
+    return travel_still(e->in, &anywhere, &e->why);
+}
+
 static int wait_until_emitting(struct engine *e)
 {
     const double most_s = fmax(EMITTING_LEAST_S, 2.0 * instrument_bench(e->in)->laser.warmup_s);
@@ -76,6 +84,9 @@ static int wait_until_emitting(struct engine *e)
             return rc;
         if (s.state == LASER_EMITTING && s.emission)
             return 0;
+        rc = check_axes(e);
+        if (rc < 0)
+            return rc;
         const double s_since = (double)(clk_now_ns(e->ports->clk) - start_ns) * 1e-9;
         if ((s.state == LASER_OFF && s_since > OFF_AT_FIRST_S) || s_since > most_s)
             return gon_fail(
@@ -145,8 +156,10 @@ static int warm_up(struct engine *e)
         if (engine_pause_asked(e))
             return engine_operator_paused(e);
         rc = engine_nap(e, left_ns < CLK_MS(100) ? left_ns : CLK_MS(100));
-        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
+        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns) {
             rc = engine_check_laser(e);
+            rc = rc < 0 ? rc : check_axes(e);
+        }
     }
     if (rc >= 0)
         rc = instrument_fit_monitor(e->in, &e->why);

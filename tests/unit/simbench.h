@@ -45,6 +45,7 @@ struct simbench_axis {
     int misses;   // the next moves end this number of times somewhere else
     bool frozen;  // never done
     bool swallow; // the next command is lost with its answer
+    bool disabled; // since it restarted: nothing moves before it was identified
     int moves, stops;
 };
 
@@ -112,7 +113,10 @@ static inline int simbench_axis_identify(struct axis *a, struct gon_error *err)
 {
     struct simbench_axis *s = (struct simbench_axis *)a;
     bool done;
-    return simbench_call(s->bench, SIMBENCH_AXES, &done, err);
+    int rc = simbench_call(s->bench, SIMBENCH_AXES, &done, err);
+    if (done)
+        s->disabled = false;
+    return rc;
 }
 
 static inline int simbench_axis_status(struct axis *a, struct axis_status *ret,
@@ -151,7 +155,7 @@ static inline int simbench_axis_move(struct axis *a, int32_t position, int32_t s
         s->swallow = done = false;
         rc = gon_fail(err, GON_E_LINK, "no answer");
     }
-    if (!done || s->alarm)
+    if (!done || s->alarm || s->disabled)
         return rc;
     s->moves++;
     s->target_steps = position;
@@ -182,7 +186,7 @@ static inline int simbench_axis_home(struct axis *a, struct gon_error *err)
     struct simbench_axis *s = (struct simbench_axis *)a;
     bool done;
     int rc = simbench_call(s->bench, SIMBENCH_AXES, &done, err);
-    if (done) {
+    if (done && !s->disabled) {
         s->homing = true;
         motion_go(&s->bench->world.axis[s->which], 0.0, 10.0, 50.0, 50.0, s->bench->clk.t_ns);
     }
