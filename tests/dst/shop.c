@@ -46,8 +46,13 @@ void shop_begin(struct shop *s, const struct bench_config *bench, const char *be
 {
     *s = (struct shop){
         .inbox = mail_new(), .answers = mail_new(), .to_runner = to_runner, .to_main = to_main};
-    s->links =
-        (struct storer_links){clk_system(), bench, bench_text, ".", s->inbox, to_main, s->answers};
+    s->links = (struct storer_links){.clk = clk_system(),
+                                     .bench = bench,
+                                     .bench_text = bench_text,
+                                     .directory = ".",
+                                     .box = s->inbox,
+                                     .to_main = to_main,
+                                     .to_runner = s->answers};
     s->core = storer_new(&s->links);
     if (!s->inbox || !s->answers || !s->core)
         abort();

@@ -197,7 +197,7 @@ static void begin(struct trial *t, const struct trial_spec *spec)
     memcpy(t->plan.points, t->material->plan.points,
            (size_t)t->plan.count * sizeof *t->plan.points);
     watch_init(&t->watch, &t->rig, &t->bench, &t->plan);
-    if (instrument_open(&t->bench, clk_system(), &t->in, &err) < 0)
+    if (instrument_open(&t->bench, NULL, clk_system(), &t->in, &err) < 0)
         give_up("the bench", err.text);
     instrument_watch(t->in, breathed, t);
 }
