@@ -77,6 +77,7 @@ static int spawn(struct guardian *g, int fd, struct gon_error *err)
     posix_spawn_file_actions_adddup2(&actions, STDIN_FILENO, STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, STDIN_FILENO, STDERR_FILENO);
     posix_spawn_file_actions_adddup2(&actions, fd, GUARD_FD);
+    posix_spawn_file_actions_addclosefrom_np(&actions, GUARD_FD + 1); // no other device's port
     int rc = posix_spawnp(&g->pid, program, &actions, &attributes, argv, environ);
     posix_spawn_file_actions_destroy(&actions);
     posix_spawnattr_destroy(&attributes);

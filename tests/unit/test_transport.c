@@ -283,6 +283,28 @@ static void the_second_opener_hears_who_has_it(void **state)
     close(l.master);
 }
 
+static void *let_go_later(void *ctx)
+{
+    clk_sleep(clk_system(), CLK_MS(60), NULL);
+    close(*(int *)ctx);
+    return NULL;
+}
+
+// Closed, and still locked for a moment, as by somebody who looks into /proc/PID/fd.
+static void ones_own_lock_is_waited_for(void **state)
+{
+    (void)state;
+    pthread_t thread;
+    struct line l = line_new();
+    struct transport *t = open_link(l.link);
+    int copy = dup(transport_fd(t));
+    transport_close(t);
+    assert_int_equal(pthread_create(&thread, NULL, let_go_later, &copy), 0);
+    transport_close(open_link(l.link));
+    pthread_join(thread, NULL);
+    close(l.master);
+}
+
 // As another user, who may not even open a port in use (TIOCEXCL).
 static int open_as_nobody(const char *link, const char *said)
 {
@@ -604,6 +626,7 @@ int main(void)
         cmocka_unit_test(links_in_the_file_system_are_followed_by_their_text),
         cmocka_unit_test(what_cannot_be_opened_says_why),
         cmocka_unit_test(the_second_opener_hears_who_has_it),
+        cmocka_unit_test(ones_own_lock_is_waited_for),
         cmocka_unit_test(permission_denied_says_which_group_to_join),
         cmocka_unit_test(a_hang_up_is_gone_at_once),
         cmocka_unit_test(silence_is_a_link_error_at_the_deadline),
