@@ -11,8 +11,8 @@
 static const struct verb *const verbs[] = {
     &verb_plan,  &verb_run,    &verb_watch, &verb_status,  &verb_devices, &verb_stop,
     &verb_pause, &verb_resume, &verb_queue, &verb_control, &verb_list,    &verb_show,
-    &verb_exclude, &verb_restore, &verb_remeasure,
-    &verb_verify, &verb_fit,   &verb_model, &verb_check,   &verb_doctor,  &verb_profile,
+    &verb_exclude, &verb_restore, &verb_remeasure, &verb_verify, &verb_fit, &verb_model,
+    &verb_check, &verb_doctor, &verb_profile,
 };
 enum { VERBS = sizeof verbs / sizeof *verbs };
 

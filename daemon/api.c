@@ -268,9 +268,11 @@ static struct http_reply post_exclusions(const struct call *c)
     struct gon_error err;
     struct decision *d = NULL;
     char number[12], uid[40];
-    snprintf(number, sizeof number, "%.*s", (int)strcspn(c->rest, "/"), c->rest);
+    const size_t digits = strcspn(c->rest, "/");
+    snprintf(number, sizeof number, "%.*s", (int)digits, c->rest);
     snprintf(uid, sizeof uid, "uid %ld", c->request->uid);
-    const int run = strcspn(c->rest, "/") < sizeof number ? run_number(number) : 0;
+    const bool whole = digits < sizeof number && !strcmp(c->rest + digits, "/exclusions");
+    const int run = whole ? run_number(number) : 0;
     if (run == 0)
         return fail(404, "there is no such run", c->request->path, "see: gonio list");
     if (decision_parse(c->request->body, c->request->size,
