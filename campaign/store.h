@@ -71,6 +71,7 @@ struct store_reading {
 
 struct store_progress {
     int done, total;  // points
+    int again;        // points that were done and are to be measured again
     int sweep, point; // the first without an accepted reading; -1 when there is none
     int64_t readings; // rows: every attempt
     int64_t excluded; // of them accepted ones that do not count, as somebody decided

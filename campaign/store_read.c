@@ -85,9 +85,10 @@ static void mark_done(struct plan *p, const struct store_reading *rows, int coun
         struct plan_point *point = &p->points[i];
         for (; k < count && rows[k].sweep == point->sweep && rows[k].point == point->point; k++) {
             point->attempts = rows[k].attempt;
+            const bool accepted = !(rows[k].flags & STORE_REJECTING);
             point->done = point->done || store_reading_settles(&rows[k]);
-            point->excluded +=
-                !(rows[k].flags & STORE_REJECTING) && !store_reading_counts(&rows[k]);
+            point->again = !point->done && (point->again || accepted);
+            point->excluded += accepted && !store_reading_counts(&rows[k]);
         }
     }
 }
@@ -143,6 +144,7 @@ int store_read_progress(struct store *s, struct store_progress *ret_progress, st
         const struct plan_point *point = &p.points[i];
         open = i && p.points[i - 1].sweep == point->sweep ? open + !point->done : !point->done;
         progress.done += point->done;
+        progress.again += point->again;
         progress.readings += point->attempts;
         progress.excluded += point->excluded;
         if (!point->done && progress.sweep < 0) {

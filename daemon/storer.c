@@ -379,7 +379,7 @@ static bool is_open_again(const struct storer *s, const struct note *n)
 {
     struct store_progress p;
     return n->state == RUN_DONE && s->store && n->run == s->run &&
-           store_read_progress(s->store, &p, NULL) == 0 && p.done < p.total;
+           store_read_progress(s->store, &p, NULL) == 0 && p.again > 0;
 }
 
 static void close_run(struct storer *s, struct note *n)

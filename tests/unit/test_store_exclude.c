@@ -316,6 +316,7 @@ static void a_sweep_is_measured_again_with_its_references(void **state)
     assert_int_equal(all, sweep_2);
     p = progress(s);
     assert_int_equal(p.done, total - sweep_2 - 4);
+    assert_int_equal(p.again, sweep_2 + 4);
     assert_true(p.sweep == 0 && p.point == 0 && p.excluded == sweep_2);
     assert_int_equal(store_read_state(s, text, sizeof text, NULL, 0, NULL, NULL), 0);
     assert_string_equal(text, "stopped");
@@ -328,7 +329,7 @@ static void a_sweep_is_measured_again_with_its_references(void **state)
 
     assert_int_equal(measure_open(s, 1.02), sweep_2 + 4); // and the beam has 2 % more
     p = progress(s);
-    assert_true(p.done == total && p.readings == total + sweep_2 + 4);
+    assert_true(p.done == total && p.again == 0 && p.readings == total + sweep_2 + 4);
     r = reduced(s);
     assert_true(r.beams == 4 && r.darks == 4);
     assert_int_equal(r.count, number("SELECT count(*) FROM plan WHERE kind = 'sample'"));
@@ -442,6 +443,7 @@ static void a_campaign_that_goes_on_normally_reopens_nothing(void **state)
 {
     (void)state;
     struct store *s = created();
+    assert_int_equal(progress(s).again, 0);
     assert_int_equal(store_reopen_closing(s, 5, NULL), 0);
     measure_open(s, 1);
     assert_int_equal(store_reopen_closing(s, 5, NULL), 0);
