@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Readings as a person names them: SWEEP, SWEEP/POINT, SWEEP/FIRST-LAST, SWEEP/POINT/ATTEMPT, several
-// with commas: "1/3,1/5-9,2". The numbers are those of the plan. Thread: any.
+// Readings as a person names them: SWEEP, SWEEP/POINT, SWEEP/FIRST-LAST, SWEEP/POINT/ATTEMPT,
+// several with commas: "1/3,1/5-9,2". The numbers are those of the plan. Thread: any.
 #pragma once
 #include "base/err.h"
 

@@ -189,15 +189,16 @@ static int none_left(const char *what, int excluded, struct gon_error *err)
                     what, excluded, excluded == 1 ? "is" : "are");
 }
 
-static int reduce_dark(struct reduction *r, const struct reduce_references *f, struct gon_error *err)
+static int reduce_dark(struct reduction *r, const struct reduce_references *f,
+                       struct gon_error *err)
 {
     int excluded_beams = 0;
     r->darks = f->dark_signal.n;
     for (int i = 0; i < POL_COUNT; i++)
         r->beams += f->beam[i].signal.n;
     r->reference = reduce_reference_means(f);
-    r->u_dark_v =
-        hypot(reduce_mean_u(&f->dark_signal), without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
+    r->u_dark_v = hypot(reduce_mean_u(&f->dark_signal),
+                        without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
     for (int i = 0; i < POL_COUNT; i++)
         excluded_beams += f->beam[i].excluded;
     if (!r->darks && f->dark_excluded)
@@ -242,7 +243,8 @@ static int add_channel(struct reduction *r, const struct reduce_references *f,
     int rc = check_beam(r, beam, p->pol_in, err);
     if (rc < 0)
         return rc;
-    const double ratio = reduce_mean_of(&beam->ratio), signal_v = r->reference.beam_signal_v[p->pol_in];
+    const double ratio = reduce_mean_of(&beam->ratio),
+                 signal_v = r->reference.beam_signal_v[p->pol_in];
     const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
     const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
     *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};
@@ -278,8 +280,7 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
                struct gon_error *err)
 {
     struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
-    const struct reduce_references f =
-        reduce_references_of(plan, rows, count, plan->sweeps + 1);
+    const struct reduce_references f = reduce_references_of(plan, rows, count, plan->sweeps + 1);
     r.noise = reduce_noise_of(plan, rows, count);
     for (int i = 0; i < count; i++)
         r.excluded += !(rows[i].flags & STORE_REJECTING) && !store_reading_counts(&rows[i]);

@@ -28,8 +28,9 @@ static double without_nan(double value)
 
 // Returns how many accepted readings of it do not count.
 static int each_reference(const struct plan_point *p, const struct store_reading *rows, int count,
-                          int *at, void (*add)(struct reduce_references *f, const struct plan_point *p,
-                                               const struct store_reading *r),
+                          int *at,
+                          void (*add)(struct reduce_references *f, const struct plan_point *p,
+                                      const struct store_reading *r),
                           struct reduce_references *f)
 {
     int excluded = 0;
@@ -54,7 +55,8 @@ static void add_beam(struct reduce_references *f, const struct plan_point *p,
                      const struct store_reading *r)
 {
     struct reduce_beam *b = &f->beam[p->pol_in];
-    const double dark_signal = reduce_mean_of(&f->dark_signal), dark_monitor = reduce_mean_of(&f->dark_monitor);
+    const double dark_signal = reduce_mean_of(&f->dark_signal),
+                 dark_monitor = reduce_mean_of(&f->dark_monitor);
     const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
     mean_add(&b->signal, r->signal_v);
     mean_add(&b->monitor, r->monitor_v);
@@ -76,8 +78,8 @@ static void add_darks(struct reduce_references *f, const struct plan *plan,
 {
     for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
         const bool dark = plan->points[i].kind == PLAN_DARK;
-        const int excluded = each_reference(&plan->points[i], rows, count, &at,
-                                            dark ? add_dark : pass_over, f);
+        const int excluded =
+            each_reference(&plan->points[i], rows, count, &at, dark ? add_dark : pass_over, f);
         f->dark_excluded += dark ? excluded : 0;
     }
 }
@@ -87,15 +89,16 @@ static void add_beams(struct reduce_references *f, const struct plan *plan,
 {
     for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
         const bool beam = plan->points[i].kind == PLAN_BEAM;
-        const int excluded = each_reference(&plan->points[i], rows, count, &at,
-                                            beam ? add_beam : pass_over, f);
+        const int excluded =
+            each_reference(&plan->points[i], rows, count, &at, beam ? add_beam : pass_over, f);
         f->beam[plan->points[i].pol_in].excluded += beam ? excluded : 0;
     }
 }
 
 struct reduce_reference reduce_reference_means(const struct reduce_references *f)
 {
-    struct reduce_reference r = {reduce_mean_of(&f->dark_signal), reduce_mean_of(&f->dark_monitor), {0}, {0}};
+    struct reduce_reference r = {
+        reduce_mean_of(&f->dark_signal), reduce_mean_of(&f->dark_monitor), {0}, {0}};
     for (int i = 0; i < POL_COUNT; i++) {
         r.beam_signal_v[i] = reduce_mean_of(&f->beam[i].signal);
         r.beam_monitor_v[i] = reduce_mean_of(&f->beam[i].monitor);

@@ -3,8 +3,8 @@
 #pragma once
 #include "campaign/reduce.h"
 
-// Mean of a few values and its standard uncertainty, 0 for a single one: half the difference of two,
-// which is also what their scatter gives, and of more half the largest difference.
+// Mean of a few values and its standard uncertainty, 0 for a single one: half the difference of
+// two, which is also what their scatter gives, and of more half the largest difference.
 struct reduce_mean {
     double sum, least, most;
     int n;

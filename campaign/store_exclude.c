@@ -45,11 +45,11 @@ static int put_row(struct store *s, const struct store_reading *r, enum store_st
         return rc;
     const int64_t id = sqlite3_step(q) == SQLITE_ROW ? sqlite3_column_int64(q, 0) : 0;
     sqlite3_finalize(q);
-    const struct store_exclusion e = {id,         d->t_utc_ms,         r->sweep,  r->point,
-                                      r->attempt, store_standing_name(standing),
+    const struct store_exclusion e = {id,        d->t_utc_ms, r->sweep,
+                                      r->point,  r->attempt,  store_standing_name(standing),
                                       d->reason, d->who};
-    rc = store_db_prepare(
-        s, "INSERT INTO exclusion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)", &q, err);
+    rc = store_db_prepare(s, "INSERT INTO exclusion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+                          &q, err);
     if (rc < 0)
         return rc;
     sqlite3_bind_int64(q, 1, e.id);
@@ -156,9 +156,8 @@ static int decide_all(struct store *s, const struct reading_pick *picks, int cou
     return rc < 0 ? rc : all;
 }
 
-__attribute__((format(printf, 4, 5))) static int tell(struct store *s,
-                                                      const struct store_decision *d,
-                                                      struct gon_error *err, const char *fmt, ...)
+__attribute__((format(printf, 4, 5))) static int
+tell(struct store *s, const struct store_decision *d, struct gon_error *err, const char *fmt, ...)
 {
     char text[STORE_REASON + 400];
     va_list args;

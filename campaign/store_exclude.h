@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Readings that a person takes out and puts back, and sweeps that are measured again. Nothing is
-// removed: each decision is a row of its own for each reading that it is about, with its reason, and
-// the newest row of a reading says what holds:
+// removed: each decision is a row of its own for each reading that it is about, with its reason,
+// and the newest row of a reading says what holds:
 //
 //   excluded   does not count; its point stays measured
 //   restored   counts again
@@ -9,8 +9,8 @@
 //   repeated   counts, and its point is to be measured again: a reference
 //
 // Rejected readings never count and have no rows. Errors are the store's; GON_E_INPUT also for a
-// reason that is empty or no text, and for what is not there to be excluded or restored: then nothing
-// was changed. Thread: the store's.
+// reason that is empty or no text, and for what is not there to be excluded or restored: then
+// nothing was changed. Thread: the store's.
 #pragma once
 #include "campaign/store.h"
 
@@ -41,11 +41,11 @@ int store_restore(struct store *s, const char *which, const struct store_decisio
 int store_remeasure(struct store *s, int sweep, const struct store_decision *d,
                     struct gon_error *err);
 
-// For who goes on with it: the closing references come after everything on the sample. Where a sweep
-// is open and they were measured before, they are repeated. Returns how many.
+// For who goes on with it: the closing references come after everything on the sample. Where a
+// sweep is open and they were measured before, they are repeated. Returns how many.
 int store_reopen_closing(struct store *s, int64_t t_utc_ms, struct gon_error *err);
 
-// The rows, oldest first, until each returns false; files before version 4 have none. Returns how many
-// were shown; GON_E_STORE for one whose check value is wrong.
+// The rows, oldest first, until each returns false; files before version 4 have none. Returns how
+// many were shown; GON_E_STORE for one whose check value is wrong.
 int store_each_exclusion(struct store *s, bool (*each)(void *ctx, const struct store_exclusion *e),
                          void *ctx, struct gon_error *err);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// exclude, restore: readings that do not count, and count again. A file in the folder of a daemon that
-// runs is its to write; any other is written here, under its lock.
+// exclude, restore: readings that do not count, and count again. A file in the folder of a daemon
+// that runs is its to write; any other is written here, under its lock.
 #include "base/paths.h"
 #include "campaign/catalog.h"
 #include "campaign/store_exclude.h"
@@ -232,8 +232,9 @@ static void print(const struct task *t, int readings)
     } else {
         fprintf(stderr, "%d reading%s %s %s (%s). Fit again: gonio fit %s\n", readings,
                 readings == 1 ? "" : "s",
-                t->restore ? readings == 1 ? "counts" : "count"
-                           : readings == 1 ? "does not count" : "do not count",
+                t->restore      ? readings == 1 ? "counts" : "count"
+                : readings == 1 ? "does not count"
+                                : "do not count",
                 t->restore ? "again" : "any more", t->which, t->path);
     }
 }
@@ -262,8 +263,10 @@ const struct verb verb_exclude = {
     "READINGS are named as gonio show FILE --sweep N numbers them: SWEEP/POINT, SWEEP/FIRST-LAST, "
     "SWEEP/POINT/ATTEMPT, or SWEEP for all of one, several with commas: 1/3,2/5-9. Sweep 0 and the "
     "last are the references. Or they are chosen by --theta-i and --theta-r.\n"
-    "They stay in the file, are shown with the reason, and count neither for the reduction nor for a "
-    "fit until gonio restore. Their points are not measured again: that is gonio remeasure. What was "
+    "They stay in the file, are shown with the reason, and count neither for the reduction nor for "
+    "a "
+    "fit until gonio restore. Their points are not measured again: that is gonio remeasure. What "
+    "was "
     "reduced and fitted before stays; gonio fit FILE uses what counts now.\n"
     "It also works while the campaign is measured, and for a FILE that no daemon has.\n",
     rows,
@@ -273,7 +276,8 @@ const struct verb verb_restore = {
     "restore",
     "FILE [READINGS]",
     "excluded readings that count again",
-    "READINGS as for gonio exclude. Of a point without ATTEMPT the last of its readings that do not "
+    "READINGS as for gonio exclude. Of a point without ATTEMPT the last of its readings that do "
+    "not "
     "count is taken back. Also takes back gonio remeasure, of points that are not measured yet.\n",
     rows,
     run_decide};

@@ -63,8 +63,8 @@ static void keep_what_holds(struct exclusions *x)
     int kept = 0;
     for (int i = 0; i < x->count; i++) {
         struct exclusion *e = &x->list[i];
-        const bool newest = i + 1 == x->count ||
-                            by_reading(e, e[1].sweep, e[1].point, e[1].attempt);
+        const bool newest =
+            i + 1 == x->count || by_reading(e, e[1].sweep, e[1].point, e[1].attempt);
         if (newest && strcmp(e->what, "restored")) {
             x->list[kept++] = *e;
             continue;

@@ -53,10 +53,11 @@ int decision_parse(const char *body, size_t size, const char *who, struct decisi
     json_error_t e;
     json_t *o = json_loadb(body, size, JSON_REJECT_DUPLICATES, &e);
     struct decision *d = calloc(1, sizeof *d);
-    int rc = !d ? gon_fail(err, GON_E_SYSTEM, "out of memory")
+    int rc = !d  ? gon_fail(err, GON_E_SYSTEM, "out of memory")
              : o ? take(o, who, d, err)
-                 : gon_fail(err, GON_E_INPUT, "the request's body, line %d column %d: %s; send one "
-                                              "JSON object",
+                 : gon_fail(err, GON_E_INPUT,
+                            "the request's body, line %d column %d: %s; send one "
+                            "JSON object",
                             e.line, e.column, e.text);
     json_decref(o);
     if (rc < 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What somebody decides about readings of a run (campaign/store_exclude.h), on its way from a request to
-// the store thread.
+// What somebody decides about readings of a run (campaign/store_exclude.h), on its way from a
+// request to the store thread.
 #pragma once
 #include "base/err.h"
 
@@ -20,8 +20,8 @@ struct decision {
 };
 
 // Of a request's body: {"do": "exclude"|"restore", "readings": text, "reason": text} or {"do":
-// "remeasure", "sweep": number, "reason": text}. GON_E_INPUT: not that; the reason is the store's to
-// judge.
+// "remeasure", "sweep": number, "reason": text}. GON_E_INPUT: not that; the reason is the store's
+// to judge.
 int decision_parse(const char *body, size_t size, const char *who, struct decision **ret_decision,
                    struct gon_error *err);
 // Writes it; returns how many readings it was about, or the store's error.

@@ -99,9 +99,9 @@ static void what_names_readings(void **state)
 {
     (void)state;
     static struct reading_pick p[READING_PICKS];
-    static const char *const wrong[] = {"",     "x",     "1/",      "1/2-",  "1/5-3", "1/2/0", "1/2/",
-                                        "1,",   ",1",    "1/2/3/4", "-1/2",  "1 /2",  "1/2;3", "1/-2",
-                                        "1/2x", "1/99999999999999999999"};
+    static const char *const wrong[] = {
+        "",   "x",       "1/",   "1/2-", "1/5-3", "1/2/0", "1/2/", "1,",
+        ",1", "1/2/3/4", "-1/2", "1 /2", "1/2;3", "1/-2",  "1/2x", "1/99999999999999999999"};
     struct gon_error err;
     assert_int_equal(reading_picks_take("1/3,2/5-9,4,1/2/7,0/0", p, NULL), 5);
     assert_true(p[0].sweep == 1 && p[0].first == 3 && p[0].last == 3 && p[0].attempt == 0);
@@ -137,8 +137,7 @@ static void an_excluded_reading_is_not_reduced_until_it_is_restored(void **state
     assert_int_equal(store_restore(s, "2/0-1,1/3", &dust, NULL), 3);
     after = reduced(s);
     assert_true(after.count == before.count && after.excluded == 0);
-    assert_memory_equal(after.points, before.points,
-                        (size_t)before.count * sizeof *before.points);
+    assert_memory_equal(after.points, before.points, (size_t)before.count * sizeof *before.points);
     assert_true(after.noise.floor_v == before.noise.floor_v && after.noise.rel == before.noise.rel);
     assert_int_equal(number("SELECT count(*) FROM exclusion"), 6); // nothing was taken back
     reduction_clear(&before);
@@ -261,9 +260,8 @@ static void the_history_tells_who_and_why(void **state)
     assert_string_equal(rows, "1 1/3/1 excluded by Max: dust on the sample\n"
                               "2 1/3/1 restored by Eva: it was none\n");
     store_each_event(s, 0, note_event, events, NULL);
-    assert_string_equal(events,
-                        "notice store Max excludes 1 reading (1/3): dust on the sample\n"
-                        "notice store Eva restores 1 reading (1/3): it was none\n");
+    assert_string_equal(events, "notice store Max excludes 1 reading (1/3): dust on the sample\n"
+                                "notice store Eva restores 1 reading (1/3): it was none\n");
     store_close(s, NULL);
 }
 
@@ -392,8 +390,7 @@ static void it_can_be_taken_back_before_it_is_measured(void **state)
     assert_true(store_remeasure(s, 2, &dust, NULL) > 0);
     assert_true(store_restore(s, "0,2,4", &dust, NULL) > 0);
     after = reduced(s);
-    assert_memory_equal(after.points, before.points,
-                        (size_t)before.count * sizeof *before.points);
+    assert_memory_equal(after.points, before.points, (size_t)before.count * sizeof *before.points);
     struct store_progress p = progress(s);
     assert_int_equal(p.done, p.total);
     reduction_clear(&before);
