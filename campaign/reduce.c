@@ -3,6 +3,7 @@
 
 #include "base/units.h"
 #include "campaign/reduce_elements.h"
+#include "campaign/reduce_references.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,19 +12,14 @@
 
 // --- which readings count ------------------------------------------------------------------------
 
-static bool accepted(const struct store_reading *r)
-{
-    return !(r->flags & STORE_REJECTING);
-}
-
-// Walks plan and rows together; both are in the plan's order. Returns the last accepted reading of
-// the point, or NULL.
+// Walks plan and rows together; both are in the plan's order. Returns the last reading of the
+// point that counts, or NULL.
 static const struct store_reading *reading_of(const struct plan_point *p,
                                               const struct store_reading *rows, int count, int *at)
 {
     const struct store_reading *found = NULL;
     for (; *at < count && rows[*at].sweep == p->sweep && rows[*at].point == p->point; (*at)++)
-        if (accepted(&rows[*at]))
+        if (store_reading_counts(&rows[*at]))
             found = &rows[*at];
     return found;
 }
@@ -124,99 +120,9 @@ static double sample_u_v(const struct reduce_noise *n, double signal_v)
     return hypot(n->floor_v, n->rel * signal_v);
 }
 
-// --- references ----------------------------------------------------------------------------------
-
-// Mean and standard uncertainty of the mean of a few values, from their scatter: 0 for a single
-// one.
-struct mean {
-    double sum, sum2;
-    int n;
-};
-
-static void mean_add(struct mean *m, double value)
-{
-    m->sum += value;
-    m->sum2 += value * value;
-    m->n++;
-}
-
-static double mean_of(const struct mean *m)
-{
-    return m->n ? m->sum / m->n : (double)NAN;
-}
-
-static double mean_u(const struct mean *m)
-{
-    if (m->n < 2)
-        return 0;
-    return sqrt(fmax(0, m->sum2 - m->sum * m->sum / m->n) / (m->n - 1) / m->n);
-}
-
 static double without_nan(double value)
 {
     return isnan(value) ? 0 : value;
-}
-
-struct beam {
-    struct mean signal, monitor, ratio;
-    int samples, out; // out: what stood before the detector
-};
-
-struct references {
-    struct mean dark_signal, dark_monitor;
-    int dark_samples;
-    struct beam beam[POL_COUNT]; // by the light's state
-};
-
-static void add_darks(struct references *f, const struct plan *plan,
-                      const struct store_reading *rows, int count, int last_sweep)
-{
-    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
-        const struct store_reading *r = reading_of(&plan->points[i], rows, count, &at);
-        if (!r || plan->points[i].kind != PLAN_DARK)
-            continue;
-        mean_add(&f->dark_signal, r->signal_v);
-        mean_add(&f->dark_monitor, r->monitor_v);
-        f->dark_samples += r->count;
-    }
-}
-
-static void add_beams(struct references *f, const struct plan *plan,
-                      const struct store_reading *rows, int count, int last_sweep)
-{
-    const double dark_signal = mean_of(&f->dark_signal), dark_monitor = mean_of(&f->dark_monitor);
-    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
-        const struct plan_point *p = &plan->points[i];
-        const struct store_reading *r = reading_of(p, rows, count, &at);
-        if (!r || p->kind != PLAN_BEAM)
-            continue;
-        struct beam *b = &f->beam[p->pol_in];
-        const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
-        mean_add(&b->signal, r->signal_v);
-        mean_add(&b->monitor, r->monitor_v);
-        mean_add(&b->ratio, (r->signal_v - dark_signal) / monitor);
-        b->samples += r->count;
-        b->out = p->pol_out;
-    }
-}
-
-static struct reduce_reference means(const struct references *f)
-{
-    struct reduce_reference r = {mean_of(&f->dark_signal), mean_of(&f->dark_monitor), {0}, {0}};
-    for (int i = 0; i < POL_COUNT; i++) {
-        r.beam_signal_v[i] = mean_of(&f->beam[i].signal);
-        r.beam_monitor_v[i] = mean_of(&f->beam[i].monitor);
-    }
-    return r;
-}
-
-struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
-                                       int count)
-{
-    struct references f = {0};
-    add_darks(&f, plan, rows, count, 0);
-    add_beams(&f, plan, rows, count, 0);
-    return means(&f);
 }
 
 // --- points --------------------------------------------------------------------------------------
@@ -275,24 +181,45 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
 
 // --- all of it -----------------------------------------------------------------------------------
 
-static int reduce_dark(struct reduction *r, const struct references *f, struct gon_error *err)
+static int none_left(const char *what, int excluded, struct gon_error *err)
 {
+    return gon_fail(err, GON_E_INPUT,
+                    "no %s reading is left, %d %s excluded: without one there is no absolute BRDF; "
+                    "take one back: gonio restore",
+                    what, excluded, excluded == 1 ? "is" : "are");
+}
+
+static int reduce_dark(struct reduction *r, const struct reduce_references *f,
+                       struct gon_error *err)
+{
+    int excluded_beams = 0;
     r->darks = f->dark_signal.n;
     for (int i = 0; i < POL_COUNT; i++)
         r->beams += f->beam[i].signal.n;
-    r->reference = means(f);
-    r->u_dark_v =
-        hypot(mean_u(&f->dark_signal), without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
+    r->reference = reduce_reference_means(f);
+    r->u_dark_v = hypot(reduce_mean_u(&f->dark_signal),
+                        without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
+    for (int i = 0; i < POL_COUNT; i++)
+        excluded_beams += f->beam[i].excluded;
+    if (!r->darks && f->dark_excluded)
+        return none_left("dark", f->dark_excluded, err);
+    if (r->darks && !r->beams && excluded_beams)
+        return none_left("beam", excluded_beams, err);
     if (!r->darks || !r->beams)
         return gon_fail(err, GON_E_INPUT, "no %s reading yet: without it there is no absolute BRDF",
                         r->darks ? "beam" : "dark");
     return GON_OK;
 }
 
-static int check_beam(const struct reduction *r, const struct beam *beam, int pol_in,
+static int check_beam(const struct reduction *r, const struct reduce_beam *beam, int pol_in,
                       struct gon_error *err)
 {
-    const double ratio = mean_of(&beam->ratio);
+    char what[40];
+    const double ratio = reduce_mean_of(&beam->ratio);
+    snprintf(what, sizeof what, "beam (pol_in = \"%s\")",
+             polarisation_name((enum polarisation)pol_in));
+    if (!beam->signal.n && beam->excluded)
+        return none_left(what, beam->excluded, err);
     if (!beam->signal.n)
         return gon_fail(err, GON_E_INPUT,
                         "no beam reading yet of pol_in = \"%s\": without it there is no absolute "
@@ -307,23 +234,24 @@ static int check_beam(const struct reduction *r, const struct beam *beam, int po
                     r->reference.dark_signal_v, r->reference.dark_monitor_v);
 }
 
-static int add_channel(struct reduction *r, const struct references *f,
+static int add_channel(struct reduction *r, const struct reduce_references *f,
                        const struct bench_config *bench, const struct plan_point *p,
                        struct gon_error *err)
 {
-    const struct beam *beam = &f->beam[p->pol_in];
+    const struct reduce_beam *beam = &f->beam[p->pol_in];
     struct reduce_channel *c = &r->channel[r->channels];
     int rc = check_beam(r, beam, p->pol_in, err);
     if (rc < 0)
         return rc;
-    const double ratio = mean_of(&beam->ratio), signal_v = r->reference.beam_signal_v[p->pol_in];
+    const double ratio = reduce_mean_of(&beam->ratio),
+                 signal_v = r->reference.beam_signal_v[p->pol_in];
     const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
     const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
     *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};
     c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
                                             &c->u_analyser_rel);
     c->beam_ratio /= bench_beam_passes(bench, &c->u_filter_rel);
-    c->u_beam_rel = hypot(mean_u(&beam->ratio) / ratio,
+    c->u_beam_rel = hypot(reduce_mean_u(&beam->ratio) / ratio,
                           hypot(noise, r->noise.rel_monitor) / sqrt(beam->samples));
     c->u_scale_rel = hypot(hypot(c->u_beam_rel, hypot(c->u_analyser_rel, c->u_filter_rel)), shared);
     r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
@@ -333,7 +261,7 @@ static int add_channel(struct reduction *r, const struct references *f,
     return GON_OK;
 }
 
-static int reduce_channels(struct reduction *r, const struct references *f,
+static int reduce_channels(struct reduction *r, const struct reduce_references *f,
                            const struct bench_config *bench, const struct plan *plan,
                            struct gon_error *err)
 {
@@ -353,10 +281,10 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
                struct gon_error *err)
 {
     struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
-    struct references f = {0};
-    add_darks(&f, plan, rows, count, plan->sweeps + 1);
-    add_beams(&f, plan, rows, count, plan->sweeps + 1);
+    const struct reduce_references f = reduce_references_of(plan, rows, count, plan->sweeps + 1);
     r.noise = reduce_noise_of(plan, rows, count);
+    for (int i = 0; i < count; i++)
+        r.excluded += !(rows[i].flags & STORE_REJECTING) && !store_reading_counts(&rows[i]);
     r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
     r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
     r.u_linearity_rel = bench->detector.u_linearity_rel;

@@ -7,7 +7,9 @@
 //
 // S signal, M monitor (1 without one), D dark with the laser off, 0 the beam; Omega = pi r^2/d^2.
 // Opening and closing beam and dark are averaged; half their difference is part of their
-// uncertainty. Angles are those of the encoders.
+// uncertainty. Where sweeps were measured again there are more of them, of days that may differ: all
+// that count are averaged, and half of the largest difference is part of the uncertainty, which then
+// holds for the sweeps of each day. Excluded readings (campaign/store_exclude.h) count nowhere. Angles are those of the encoders.
 //
 // Each reading is divided by the beam of its own pol_in, which is measured without analyser; f of
 // a reading behind the analyser is divided by its transmission T as well, so that f = 1/2 a^T F g
@@ -69,6 +71,7 @@ struct reduction {
     int left_out;     // points on the sample that were measured and could not be reduced (cosine,
                       // monitor)
     int beams, darks; // how many readings the references are means of
+    int excluded;     // accepted readings, references too, that do not count, as somebody decided
     double omega_sr;
     struct reduce_reference reference;
     double u_dark_v; // of the dark signal's mean
@@ -88,7 +91,7 @@ struct reduction {
 int reduction_warning(const struct reduction *r, char *text, size_t size);
 
 // Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark yet, or no beam in one of
-// the light's states, or a beam that is not above the dark.
+// the light's states, or all of them excluded; or a beam that is not above the dark.
 int reduce_run(const struct bench_config *bench, const struct plan *plan,
                const struct store_reading *rows, int count, struct reduction *ret_reduction,
                struct gon_error *err);

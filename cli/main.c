@@ -9,10 +9,11 @@
 #include <string.h>
 
 static const struct verb *const verbs[] = {
-    &verb_plan,   &verb_run,     &verb_watch,  &verb_status,  &verb_devices, &verb_stop,
-    &verb_laser,  &verb_pause,   &verb_resume, &verb_queue,   &verb_control, &verb_list,
-    &verb_show,   &verb_verify,  &verb_backup, &verb_fit,     &verb_model,   &verb_check,
-    &verb_doctor, &verb_profile,
+    &verb_plan,    &verb_run,     &verb_watch,     &verb_status, &verb_devices, &verb_stop,
+    &verb_laser,   &verb_pause,   &verb_resume,    &verb_queue,  &verb_control, &verb_list,
+    &verb_show,    &verb_exclude, &verb_restore,   &verb_remeasure,
+    &verb_verify,  &verb_backup,  &verb_fit,       &verb_model,  &verb_check,   &verb_doctor,
+    &verb_profile,
 };
 enum { VERBS = sizeof verbs / sizeof *verbs };
 
@@ -20,7 +21,7 @@ static void print_verbs(FILE *out)
 {
     fprintf(out, "usage: gonio VERB [OPTIONS] [FILE]\n\n");
     for (int i = 0; i < VERBS; i++)
-        fprintf(out, "  %-8s %s\n", verbs[i]->name, verbs[i]->summary);
+        fprintf(out, "  %-9s %s\n", verbs[i]->name, verbs[i]->summary);
     fprintf(out, "\ngonio help VERB tells more; gonio --version; the daemon: goniod --help\n"
                  "Exit status: 0 done, 1 the instrument or the fit failed, 2 wrong arguments or\n"
                  "file, 3 no daemon, 4 refused, 130 interrupted.\n");

@@ -26,9 +26,10 @@ struct verb {
 extern const struct verb verb_plan, verb_check;
 extern const struct verb verb_devices, verb_doctor;
 extern const struct verb verb_run, verb_watch;
-extern const struct verb verb_status, verb_stop, verb_pause, verb_resume;
+extern const struct verb verb_status, verb_stop, verb_pause, verb_resume, verb_remeasure;
 extern const struct verb verb_queue, verb_control;
 extern const struct verb verb_list, verb_show, verb_verify, verb_backup;
+extern const struct verb verb_exclude, verb_restore;
 extern const struct verb verb_fit, verb_model;
 extern const struct verb verb_profile;
 extern const struct verb verb_laser;

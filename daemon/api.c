@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/api.h"
 
+#include "daemon/decision.h"
 #include "daemon/hub.h"
 #include "daemon/inventory.h"
 #include "daemon/metrics.h"
@@ -260,6 +261,27 @@ static struct http_reply post_resume(const struct call *c)
     return told(c, run, &err);
 }
 
+// --- readings -----------------------------------------------------------------------------------
+
+static struct http_reply post_exclusions(const struct call *c)
+{
+    struct gon_error err;
+    struct decision *d = NULL;
+    char number[12], uid[40];
+    const size_t digits = strcspn(c->rest, "/");
+    snprintf(number, sizeof number, "%.*s", (int)digits, c->rest);
+    snprintf(uid, sizeof uid, "uid %ld", c->request->uid);
+    const bool whole = digits < sizeof number && !strcmp(c->rest + digits, "/exclusions");
+    const int run = whole ? run_number(number) : 0;
+    if (run == 0)
+        return fail(404, "there is no such run", c->request->path, "see: gonio list");
+    if (decision_parse(c->request->body, c->request->size,
+                       *c->request->name ? c->request->name : uid, &d, &err) < 0)
+        return failed(&err);
+    hub_decide(c->hub, run, d, c->ticket);
+    return reply(HTTP_LATER, NULL);
+}
+
 // --- who commands -------------------------------------------------------------------------------
 
 static struct http_reply get_control(const struct call *c)
@@ -341,27 +363,32 @@ static const struct route {
     struct http_reply (*handle)(const struct call *c);
     const char *allow; // all methods of that path
     bool controlled;   // only for who has control, while somebody has
+    const char *end;   // of the path, after its rest; NULL: any
 } routes[] = {
-    {"GET", "/api/v1/status", get_status, "GET", false},
-    {"GET", "/api/v1/devices", get_devices, "GET", false},
-    {"GET", "/metrics", get_metrics, "GET", false},
-    {"GET", "/api/v1/runs", get_runs, "GET, POST", false},
-    {"POST", "/api/v1/runs", post_runs, "GET, POST", true},
-    {"GET", "/api/v1/runs/", get_run, "GET", false},
-    {"GET", "/api/v1/queue", get_queue, "GET, POST", false},
-    {"POST", "/api/v1/queue", post_queue, "GET, POST", true},
-    {"GET", "/api/v1/control", get_control, "GET, POST", false},
-    {"POST", "/api/v1/control", post_control, "GET, POST", false},
-    {"GET", "/api/v1/events", get_events, "GET", false},
-    {"POST", HTTP_STOP_PATH, post_stop, "POST", false},
-    {"POST", "/api/v1/pause", post_pause, "POST", true},
-    {"POST", "/api/v1/resume", post_resume, "POST", true},
+    {"GET", "/api/v1/status", get_status, "GET", false, NULL},
+    {"GET", "/api/v1/devices", get_devices, "GET", false, NULL},
+    {"GET", "/metrics", get_metrics, "GET", false, NULL},
+    {"GET", "/api/v1/runs", get_runs, "GET, POST", false, NULL},
+    {"POST", "/api/v1/runs", post_runs, "GET, POST", true, NULL},
+    {"GET", "/api/v1/runs/", get_run, "GET", false, NULL},
+    {"POST", "/api/v1/runs/", post_exclusions, "POST", true, "/exclusions"},
+    {"GET", "/api/v1/queue", get_queue, "GET, POST", false, NULL},
+    {"POST", "/api/v1/queue", post_queue, "GET, POST", true, NULL},
+    {"GET", "/api/v1/control", get_control, "GET, POST", false, NULL},
+    {"POST", "/api/v1/control", post_control, "GET, POST", false, NULL},
+    {"GET", "/api/v1/events", get_events, "GET", false, NULL},
+    {"POST", HTTP_STOP_PATH, post_stop, "POST", false, NULL},
+    {"POST", "/api/v1/pause", post_pause, "POST", true, NULL},
+    {"POST", "/api/v1/resume", post_resume, "POST", true, NULL},
 };
 
 static const char *rest_of(const struct route *r, const char *path)
 {
     size_t n = strlen(r->path);
     bool prefix = r->path[n - 1] == '/';
+    const size_t size = strlen(path), end = r->end ? strlen(r->end) : 0;
+    if (size < n + end || (end && strcmp(path + size - end, r->end)))
+        return NULL;
     if (prefix ? strncmp(path, r->path, n) : strcmp(path, r->path))
         return NULL;
     return path + n;

@@ -7,6 +7,7 @@
 #include "campaign/bench.h"
 #include "campaign/state.h"
 #include "daemon/api.h"
+#include "daemon/decision.h"
 #include "daemon/fitter.h"
 #include "daemon/loop.h"
 #include "daemon/material.h"
@@ -335,6 +336,17 @@ void hub_find(struct hub *h, int run, uint64_t ticket)
     note_post(h->store_box, n);
 }
 
+void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t ticket)
+{
+    struct note *n = note_new(NOTE_DECIDE);
+    n->ticket = ticket;
+    n->run = run;
+    n->last = decision->verb == DECISION_REMEASURE;
+    n->thing = decision;
+    n->drop = decision_free;
+    note_post(h->store_box, n);
+}
+
 static void note_waiting(struct hub *h)
 {
     const struct run *run, *active = queue_active(h->queue);
@@ -476,6 +488,40 @@ static void known(struct hub *h, struct note *n)
     }
 }
 
+static void answer_failed(struct hub *h, uint64_t ticket, const struct gon_error *err)
+{
+    http_answer(h->http, ticket, api_status(err->code), api_error(err->code, err->text));
+}
+
+// One that has the bench or waits is measured again by itself.
+static int submit_again(struct hub *h, int run, struct gon_error *err)
+{
+    struct queue_entry entries[MOST_KEPT];
+    const size_t count = queue_entries(h->queue, entries, MOST_KEPT);
+    for (size_t i = 0; i < count; i++)
+        if (entries[i].run->id == run)
+            return GON_OK;
+    return queue_submit(h->queue, run, err);
+}
+
+static void decided(struct hub *h, const struct note *n)
+{
+    struct gon_error err = n->err;
+    const uint64_t event_id = hub_event_id(h);
+    const struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
+    if (!run || (n->last && submit_again(h, n->run, &err) < 0)) {
+        answer_failed(h, n->ticket, &err);
+        return;
+    }
+    log_say(h->options.log, LOG_NOTICE, "run", "%d: decided about %d readings, see: gonio show %d",
+            n->run, n->count, n->run);
+    char *text = hub_submitted(h, n->run, event_id);
+    json_t *o = json_loads(text, 0, NULL);
+    json_object_set_new(o, "readings", json_integer(n->count));
+    http_answer(h->http, n->ticket, n->last ? 201 : 200, view_text(o));
+    free(text);
+}
+
 static void halted(struct hub *h, const struct note *n)
 {
     if (n->err.code) {
@@ -544,7 +590,13 @@ static void take(struct hub *h, struct note *n)
     case NOTE_FOUND: found(h, n); break;
     case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
     case NOTE_FITTED: fitted(h, n); break;
-    case NOTE_CLOSED: queue_closed(h->queue, n->run, n->err.code ? &n->err : NULL); break;
+    case NOTE_CLOSED:
+        if (n->last && !n->err.code)
+            queue_reopened(h->queue, n->run);
+        else
+            queue_closed(h->queue, n->run, n->err.code ? &n->err : NULL);
+        break;
+    case NOTE_DECIDED: decided(h, n); break;
     case NOTE_HAPPENED: happened(h, n); break;
     case NOTE_FIT_ASKED: queue_fit_asked(h->queue, n->run, n->sweep, n->last); break;
     case NOTE_ENDED: engine_ended(h, n); break;

@@ -445,9 +445,9 @@ static void other_files_and_newer_ones_are_refused(void **state)
     assert_int_equal(store_open(folder.path, STORE_READ, &s, &err), GON_E_INPUT);
     unlink(path);
     store_close(created(), NULL);
-    tamper("PRAGMA user_version = 4");
+    tamper("PRAGMA user_version = 5");
     assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_REFUSED);
-    assert_non_null(strstr(err.text, "version 4 of the file, of a newer gonio"));
+    assert_non_null(strstr(err.text, "version 5 of the file, of a newer gonio"));
     assert_non_null(strstr(err.text, "install the newer one"));
     assert_int_equal(store_open(path, STORE_WRITE, &s, NULL), GON_E_REFUSED);
     assert_int_equal(fixture_files(&folder), 1);
@@ -626,24 +626,25 @@ static void an_older_file_is_copied_before_it_changes(void **state)
 {
     (void)state;
     static const char *const older[] = {"tests/golden/campaign_v1.sql",
-                                        "tests/golden/campaign_v2.sql"};
-    static const int readings[] = {7, 13};
-    for (int version = 1; version <= 2; version++) {
+                                        "tests/golden/campaign_v2.sql",
+                                        "tests/golden/campaign_v3.sql"};
+    static const int readings[] = {7, 13, 9};
+    for (int version = 1; version <= 3; version++) {
         char backup[200], second[200];
         make_from_sql(older[version - 1]);
         struct store *s = opened(STORE_WRITE);
         snprintf(backup, sizeof backup, "%s.v%d-backup", path, version);
         assert_non_null(strstr(store_notice(s), backup));
-        const struct store_reading last = reading(3, version, 1);
+        const struct store_reading last = reading(3, version == 2 ? 2 : 1, 1);
         append(s, &last);
         store_close(s, NULL);
-        assert_int_equal(number("PRAGMA user_version"), 3);
+        assert_int_equal(number("PRAGMA user_version"), 4);
         assert_int_equal(number("SELECT count(*) FROM reading"), readings[version - 1] + 1);
         assert_int_equal(number_of(backup, "PRAGMA user_version"), version);
         assert_int_equal(number_of(backup, "PRAGMA application_id"), 1735356009);
         assert_int_equal(number_of(backup, "SELECT count(*) FROM reading"), readings[version - 1]);
         assert_int_equal(number_of(backup, "SELECT count(*) FROM sqlite_schema WHERE name LIKE"
-                                           " 'profile%'"),
+                                           " 'exclusion%'"),
                          0);
         assert_int_equal(fixture_files(&folder), 2);
         s = opened(STORE_WRITE); // a second time there is nothing to do
@@ -675,7 +676,7 @@ static void a_step_that_fails_changes_nothing(void **state)
     tamper("DROP TABLE profile");
     s = opened(STORE_WRITE);
     store_close(s, NULL);
-    assert_int_equal(number("PRAGMA user_version"), 3);
+    assert_int_equal(number("PRAGMA user_version"), 4);
 }
 
 static void without_a_copy_nothing_is_changed(void **state)
