@@ -122,7 +122,8 @@ static void print_detector(const json_t *d)
         const json_t *v = json_object_get(d, keys[i]);
         if (!json_is_number(v))
             continue;
-        printf("%s%s %.4g %s", between, names[i], json_number_value(v), i < 2 ? "V" : "s");
+        printf("%s%s %.4g %s", between, names[i], json_number_value(v),
+               i < 2 ? text_of(d, "unit") : "s");
         between = ", ";
     }
 }

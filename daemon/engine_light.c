@@ -133,6 +133,11 @@ static int wait_until_steady(struct engine *e)
         e->monitor_lit_v = now_v;
         if (change < 0.5 * STEADY_REL)
             break;
+        if (clk_now_ns(e->ports->clk) > until_ns && now_v == dark_v)
+            return gon_fail(&e->why, GON_E_DEVICE,
+                            "laser: says it emits, but the monitor reads %.4g %s as in the dark; "
+                            "look at laser, shutter and monitor, then: gonio resume",
+                            now_v, unit);
         if (clk_now_ns(e->ports->clk) > until_ns)
             return gon_fail(
                 &e->why, GON_E_DEVICE,

@@ -95,6 +95,7 @@ struct instrument_snapshot {
     bool emission;             // commanded on and not read back off: what is to be assumed
     bool off_unconfirmed;      // LASER MAY BE ON
     int range;                 // of the detector; -1: not known
+    char detector_unit[12];    // of full_scale_v and signal_v: "V", "A", "W"
     double full_scale_v;
     double signal_v, monitor_v; // last sample; NAN: none
     int monitor_range;          // of a monitor of its own; -1: not known

@@ -74,11 +74,20 @@ int instrument_connect_monitor(struct instrument *in, struct gon_error *err)
     return rc < 0 ? rc : set_up(in, err);
 }
 
-const char *instrument_monitor_unit(const struct instrument *in)
+static const char *unit_of_signal(const struct profile *p)
 {
-    const struct profile *p = in->monitor.profile;
     const int signal = p ? profile_value(p, p->detector.signal) : -1;
     return signal >= 0 ? p->values[signal].unit : "V";
+}
+
+const char *instrument_monitor_unit(const struct instrument *in)
+{
+    return unit_of_signal(in->monitor.profile);
+}
+
+const char *instrument_detector_unit(const struct instrument *in)
+{
+    return unit_of_signal(in->detector_profile);
 }
 
 double instrument_monitor_time_constant_s(const struct instrument *in)

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include "daemon/instrument_devices.h"
 #include "daemon/instrument_inside.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 static const struct link_stats *stats_of(const struct instrument *in, enum instrument_part part)
@@ -36,6 +38,7 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
         .monitor_v = in->sample.monitor_v,
         .time_constant_s = in->time_constant_s,
     };
+    snprintf(s->detector_unit, sizeof s->detector_unit, "%s", instrument_detector_unit(in));
     instrument_show_monitor(in, s);
     instrument_show_devices(in, s);
     memcpy(s->part, in->part, sizeof s->part);

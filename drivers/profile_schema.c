@@ -108,7 +108,8 @@ static const struct cfg_row value_rows[] = {
     YES(profile_value, "inverse", inverse, "Instead: number = scale / wire + offset."),
     REAL(profile_value, "min", min, NULL, -1e300, 1e300, "0",
          "The least it can be; beyond it an answer is not believed, and nothing is sent."),
-    REAL(profile_value, "max", max, NULL, -1e300, 1e300, "0", "The most; equal to min: no limit."),
+    REAL(profile_value, "max", max, NULL, -1e300, 1e300, "0", "The most. Both equal, or both left out: no limit; give both, as one that is left out "
+         "is 0."),
     REAL(profile_value, "resolution", resolution, NULL, 0, 1e300, "0",
          "Of what the wire carries: a read-back may differ by so much."),
     REALS(profile_value, "over", over, over_count,
@@ -145,7 +146,8 @@ static const struct cfg_row framing_rows[] = {
     BYTES(profile_framing, "end_out", end_out, "", "Ends what is sent: \"\\r\"."),
     BYTES(profile_framing, "end_in", end_in, "", "Ends an answer: \"\\r\\n\"."),
     BYTES(profile_framing, "echo_end", echo_end, "",
-          "The device repeats each command, followed by this; without it there is no echo."),
+          "The device repeats each command, followed by this; without it there is no echo. May not "
+          "contain end_in."),
     TEXT(profile_framing, "ok_line", ok_line, "",
          "A line that follows every good answer, and is all the answer to a setting."),
     YES(profile_framing, "empty", empty, "An empty line is an answer, too."),

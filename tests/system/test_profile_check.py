@@ -56,6 +56,7 @@ def test_a_mistake_is_told_with_its_line(tmp_path):
 def test_an_unknown_profile_is_told_where_it_was_looked_for():
     r = gonio("profile", "check", "nobody")
     assert r.returncode == 2 and "no profile 'nobody': looked for " in r.stderr
+    assert "given as a path: ./NAME.cfg" in r.stderr
 
 
 def test_a_page_keeps_its_table(tmp_path):
