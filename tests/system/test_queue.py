@@ -57,6 +57,17 @@ def test_order_and_estimates(busy):
     assert busy.request("POST", "/api/v1/queue", "[")[0] == 400
 
 
+@pytest.mark.parametrize("number", [0, -1, 2**31, 2**32, 2**32 + 2, 2**63 - 1])
+def test_a_number_that_is_no_runs_names_no_run(busy, number):
+    assert do(busy, "hold")[0] == 200
+    for wrong in ({"do": "release", "run": number}, {"do": "remove", "run": number},
+                  {"do": "move", "run": number, "place": 1}, {"do": "move", "run": 3, "place": number}):
+        status, reply = busy.request("POST", "/api/v1/queue", wrong)
+        assert status == 400, (wrong, reply)
+    q = queue_of(busy)
+    assert q["held"] and [x["run"] for x in q["entries"]] == busy.runs
+
+
 def test_the_command(busy):
     a, b, c, e = busy.runs
     r = busy.gonio("queue")
