@@ -250,6 +250,29 @@ def test_lines_are_run_one_after_another(start_sim, tmp_path):
     assert re.findall(r'does = "(\w+)"', r.stdout) == ["model", "x"]
 
 
+@pytest.mark.parametrize("line, says", [("x" + " " * 600 + "y\n", "longer than 511 bytes"), ("x\0y\n", "zero byte"),
+                                        ("set: x = " + "0" * 600 + "7\n", "longer than 511 bytes")])
+def test_a_line_is_not_done_in_part(start_sim, tmp_path, line, says):
+    meter = written(tmp_path)
+    sim = start_sim("--profile", meter)
+    r = gonio("profile", "record", meter, link_to(sim, "meter"), "--interactive", stdin=line)
+    assert r.returncode == 2 and says in r.stderr and entries(r.stdout) == 1, r
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_an_input_that_cannot_be_read_is_said(start_sim, tmp_path, closed):
+    meter = written(tmp_path)
+    sim = start_sim("--profile", meter)
+    argv = [BUILD / "gonio", "profile", "record", meter, link_to(sim, "meter"), "--interactive"]
+    folder = os.open(tmp_path, os.O_RDONLY)
+    try:
+        r = subprocess.run(argv, stdin=folder, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+                           preexec_fn=(lambda: os.close(0)) if closed else None)
+    finally:
+        os.close(folder)
+    assert r.returncode == 2 and "standard input: " in r.stderr, r.stderr
+
+
 def test_a_line_is_recorded_when_it_was_typed(start_sim, tmp_path):
     meter = written(tmp_path)
     sim = start_sim("--profile", meter)
