@@ -292,6 +292,9 @@ def test_a_line_is_recorded_when_it_was_typed(start_sim, tmp_path):
 # --- what goes wrong --------------------------------------------------------------------------------
 
 
+HANG_UP = b"<hangs up>"
+
+
 class Instrument:
     """A meter over TCP that answers as a dict of bytes says; b"" hangs up, None is silence, a function is called."""
 
@@ -317,7 +320,9 @@ class Instrument:
                 if answer == b"":
                     return
                 if answer:
-                    c.sendall(answer)
+                    c.sendall(answer.removesuffix(HANG_UP))
+                    if answer.endswith(HANG_UP):
+                        return
 
 
 GOOD = {b"WHO?": b"Meter 3\r\n", b"X?": b"1.500 V\r\n", b"G?": b"2\r\n"}
@@ -339,6 +344,16 @@ def test_a_failure_is_a_comment_with_what_came(tmp_path, answer, says):
     assert re.findall(r'does = "(\w+)"', r.stdout) == ["model", "gain"]
     check = gonio("profile", "check", pasted(meter, r.stdout, tmp_path / "p"))
     assert check.returncode == 0, check.stderr
+
+
+@pytest.mark.parametrize("answer", [b"1.5", b"1.500 V", b"1.500 V\r"])
+def test_an_answer_that_was_broken_off_is_no_entry(tmp_path, answer):
+    """Its beginning may fit the pattern, and is another number."""
+    meter = written(tmp_path)
+    r = gonio("profile", "record", meter, Instrument({**GOOD, b"X?": lambda: answer + HANG_UP}).link)
+    assert r.returncode == 1
+    assert re.findall(r'does = "(\w+)"', r.stdout) == ["model"], r.stdout
+    assert any("broken off" in c for c in comments(r.stdout)), r.stdout
 
 
 def test_a_retry_loses_nothing(tmp_path):
