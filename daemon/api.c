@@ -199,7 +199,9 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
     int rc = hub_submit(c->hub, (int)id, c->ticket, &err);
     if (rc < 0)
         return failed(&err);
-    return rc ? reply(201, hub_submitted(c->hub, (int)id, event_id)) : reply(HTTP_LATER, NULL);
+    if (rc)
+        hub_answer_kept(c->hub, c->ticket, 201, hub_submitted(c->hub, (int)id, event_id));
+    return reply(HTTP_LATER, NULL);
 }
 
 static struct http_reply create_run(const struct call *c, json_t *body)
@@ -352,7 +354,10 @@ static struct http_reply post_queue(const struct call *c)
     }
     const int rc = arrange_body(c, body, what, run, place, &err);
     json_decref(body);
-    return rc < 0 ? failed(&err) : get_queue(c);
+    if (rc < 0)
+        return failed(&err);
+    hub_answer_kept(c->hub, c->ticket, 200, view_text(view_queue(hub_queue(c->hub))));
+    return reply(HTTP_LATER, NULL);
 }
 
 // --- routes -------------------------------------------------------------------------------------
