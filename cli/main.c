@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // gonio: finds the verb and runs it.
+#include "base/standard.h"
 #include "cli/out.h"
 #include "cli/verb.h"
 
@@ -135,6 +136,7 @@ int verb_take(const struct verb *verb, int argc, char **argv, void *target, cons
 
 int main(int argc, char **argv)
 {
+    standard_hold();
     signal(SIGPIPE, SIG_IGN);
     curl_global_init(CURL_GLOBAL_DEFAULT);
     int status = out_finish(dispatch(argc - 1, argv + 1));

@@ -200,7 +200,9 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
     int rc = hub_submit(c->hub, (int)id, c->ticket, &err);
     if (rc < 0)
         return failed(&err);
-    return rc ? reply(201, hub_submitted(c->hub, (int)id, event_id)) : reply(HTTP_LATER, NULL);
+    if (rc)
+        hub_answer_kept(c->hub, c->ticket, 201, hub_submitted(c->hub, (int)id, event_id));
+    return reply(HTTP_LATER, NULL);
 }
 
 static struct http_reply create_run(const struct call *c, json_t *body)
@@ -337,23 +339,47 @@ static int arrange(const struct call *c, const char *what, int run, int place,
     return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\"; use hold, release, remove or move", what);
 }
 
+// JSON's numbers are wider than an int. One that does not fit is no run's and no place, and must
+// not become another by being cut; 0 is not given, which names the whole queue.
+static int whole(const char *name, json_int_t given, int *ret, struct gon_error *err)
+{
+    if (given < 1 || given > INT_MAX)
+        return gon_fail(err, GON_E_INPUT, "\"%s\": %" JSON_INTEGER_FORMAT " is none; from 1", name,
+                        given);
+    *ret = (int)given;
+    return GON_OK;
+}
+
+static int arrange_body(const struct call *c, const json_t *body, const char *what, json_int_t run,
+                        json_int_t place, struct gon_error *err)
+{
+    int its_run = 0, its_place = 0;
+    int rc = json_object_get(body, "run") ? whole("run", run, &its_run, err) : GON_OK;
+    if (rc == GON_OK && json_object_get(body, "place"))
+        rc = whole("place", place, &its_place, err);
+    return rc < 0 ? rc : arrange(c, what, its_run, its_place, err);
+}
+
 static struct http_reply post_queue(const struct call *c)
 {
     json_error_t e;
     struct gon_error err;
     const char *what;
-    int run = 0, place = 0;
+    json_int_t run = 0, place = 0;
     json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
-    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?i, s?i}", "do", &what, "run", &run,
+    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?I, s?I}", "do", &what, "run", &run,
                                 "place", &place) < 0) {
         json_decref(body);
         return fail(400, e.text, "the request's body",
                     "send {\"do\": \"hold\"|\"release\"|\"remove\"|\"move\", \"run\": number, "
                     "\"place\": number}");
     }
-    const int rc = arrange(c, what, run, place, &err);
+    const int rc = arrange_body(c, body, what, run, place, &err);
     json_decref(body);
-    return rc < 0 ? failed(&err) : get_queue(c);
+    if (rc < 0)
+        return failed(&err);
+    hub_answer_kept(c->hub, c->ticket, 200, view_text(view_queue(hub_queue(c->hub))));
+    return reply(HTTP_LATER, NULL);
 }
 
 // --- routes -------------------------------------------------------------------------------------

@@ -253,6 +253,21 @@ char *hub_submitted(const struct hub *h, int run, uint64_t event_id)
     return view_text(o);
 }
 
+void hub_answer_kept(struct hub *h, uint64_t ticket, int status, char *body)
+{
+    struct note *n = note_new(NOTE_KEPT);
+    n->ticket = ticket;
+    n->run = status;
+    n->text = body;
+    note_post(h->store_box, n);
+}
+
+static void kept(struct hub *h, struct note *n)
+{
+    http_answer(h->http, n->ticket, n->run, n->text);
+    n->text = NULL; // is the answer's now
+}
+
 void hub_status(const struct hub *h, struct hub_status *ret_status)
 {
     const int64_t now_ns = clk_now_ns(clk_system());
@@ -479,7 +494,7 @@ static void known(struct hub *h, struct note *n)
     struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
     int rc = run ? submit_known(h, run->id, &err) : (int)err.code;
     if (rc == 0) {
-        http_answer(h->http, n->ticket, 201, hub_submitted(h, run->id, event_id));
+        hub_answer_kept(h, n->ticket, 201, hub_submitted(h, run->id, event_id));
     } else {
         if (rc == GON_E_STORE)
             snprintf(h->last_error, sizeof h->last_error, "%s", err.text);
@@ -588,6 +603,7 @@ static void take(struct hub *h, struct note *n)
     case NOTE_UNKEPT: unkept(h, n); break;
     case NOTE_KNOWN: known(h, n); break;
     case NOTE_FOUND: found(h, n); break;
+    case NOTE_KEPT: kept(h, n); break;
     case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
     case NOTE_FITTED: fitted(h, n); break;
     case NOTE_CLOSED:

@@ -87,4 +87,6 @@ int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err);
 
 uint64_t hub_event_id(const struct hub *h); // of the newest event
 // A run with the id of the event after which all of it can be followed, as JSON text.
+// Answers once what the queue is now is on the disk; body is taken over.
+void hub_answer_kept(struct hub *h, uint64_t ticket, int status, char *body);
 char *hub_submitted(const struct hub *h, int run, uint64_t event_id);

@@ -5,6 +5,7 @@
 #include "base/log.h"
 #include "base/options.h"
 #include "base/paths.h"
+#include "base/standard.h"
 #include "campaign/bench.h"
 #include "campaign/catalog.h"
 #include "daemon/deadline.h"
@@ -386,6 +387,7 @@ int main(int argc, char **argv)
     struct daemon d = {.options = {.log = "notice", .seed = -1}};
     struct gon_error err;
     enum log_level level = LOG_NOTICE;
+    standard_hold();
     int operands = options_take(argc, argv, rows, &d.options, NULL, 0, &err);
     if (operands < 0)
         return say_error(&err);

@@ -25,6 +25,7 @@ enum note_kind {
     NOTE_CLOSE,   // run, state, text: why
     NOTE_QUEUE,   // thing: struct state_queue, to keep
     NOTE_DECIDE,  // ticket, run, last: a sweep is to be measured again, thing: struct decision
+    NOTE_KEPT,    // ticket, run: status, text: body; comes back when what came before is written
     // to the instrument thread
     NOTE_START,   // run, thing: struct run_material
     NOTE_STORED,  // sequence, err

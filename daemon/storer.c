@@ -133,6 +133,16 @@ static void keep_queue(struct storer *s, const struct note *n)
         note_post(s->links.to_main, complaint);
 }
 
+// The mail is read in its order: what was to be kept before is on the disk now.
+static void send_back(struct storer *s, const struct note *n)
+{
+    struct note *kept = note_new(NOTE_KEPT);
+    kept->ticket = n->ticket;
+    kept->run = n->run;
+    kept->text = note_text(n->text);
+    note_post(s->links.to_main, kept);
+}
+
 // --- a new campaign ------------------------------------------------------------------------------
 
 static void add_line(void *ctx, const char *line)
@@ -506,6 +516,7 @@ void storer_step(struct storer *s, struct note *n)
     case NOTE_CLOSE: close_run(s, n); break;
     case NOTE_QUEUE: keep_queue(s, n); break;
     case NOTE_DECIDE: decide(s, n); break;
+    case NOTE_KEPT: send_back(s, n); break;
     default: break;
     }
     note_free(n);

@@ -489,6 +489,10 @@ static void mistakes_in_what_is_simulated_and_golden_are_named(void **state)
     static const struct mistake mistakes[] = {
         {"value = \"emission\"; is", "value = \"emision\"; is",
          "t:48: simulate.start[0].value = \"emision\": there is no such value"},
+        {"{ value = \"emission\"; is", "{ value = \"\"; is",
+         "t:48: simulate.start[0].value = \"\": missing; it says which value"},
+        {"{ value = \"setpoint_w\"; when", "{ value = \"\"; when",
+         "t:49: simulate.drift[0].value = \"\": missing; it says which value"},
         {"is = \"0\"", "is = \"no\"", "t:48: simulate.start[0].is = \"no\": 'no' is not a number"},
         {"value = \"setpoint_w\"; when", "value = \"setpoint\"; when",
          "t:49: simulate.drift[0].value = \"setpoint\": there is no such value"},
