@@ -123,6 +123,13 @@ static int wait_until_steady(struct engine *e)
     return rc;
 }
 
+// While the light is on and nothing is measured, a lost device is still a lost device.
+static int look_around(struct engine *e)
+{
+    int rc = engine_check_laser(e);
+    return rc < 0 ? rc : engine_look_at_devices(e);
+}
+
 static int warm_up(struct engine *e)
 {
     int rc = wait_until_emitting(e);
@@ -134,7 +141,7 @@ static int warm_up(struct engine *e)
             return engine_operator_paused(e);
         rc = engine_nap(e, left_ns < CLK_MS(100) ? left_ns : CLK_MS(100));
         if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
-            rc = engine_check_laser(e);
+            rc = look_around(e);
     }
     if (rc >= 0)
         rc = instrument_fit_monitor(e->in, &e->why);
