@@ -82,6 +82,15 @@ static int read_back(struct engine *e, enum instrument_part part)
     return rc;
 }
 
+int engine_look_at_devices(struct engine *e)
+{
+    int rc = 0;
+    for (enum instrument_part part = PART_DEVICES; part < PART_COUNT && rc >= 0; part++)
+        if (instrument_is_selector(e->in, part))
+            rc = read_back(e, part);
+    return rc;
+}
+
 // With a filter before the monitor "lit" is another value of it; the laser itself says that it is
 // on. Never of a shutter, which may be stuck.
 static int learn_light(struct engine *e)

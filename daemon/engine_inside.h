@@ -69,6 +69,8 @@ int engine_turn_elements(struct engine *e);
 int engine_place_devices(struct engine *e);
 // Whether the point's station has any of them elsewhere than usual.
 bool engine_station_places(const struct engine *e);
+// Whether all answer, while the laser warms up; where they stand is seen to before the sweep.
+int engine_look_at_devices(struct engine *e);
 // All read back after a reading: with one elsewhere the reading does not count. Then, once it is
 // stored, that one is set again, the first time at a point.
 int engine_confirm_devices(struct engine *e, struct acquire_reading *r);

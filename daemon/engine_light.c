@@ -151,6 +151,15 @@ static int wait_until_steady(struct engine *e)
     return rc;
 }
 
+// While the light is on and nothing is measured, a lost device is still a lost device, and an alarm
+// an alarm.
+static int look_around(struct engine *e)
+{
+    int rc = engine_check_laser(e);
+    rc = rc < 0 ? rc : check_axes(e);
+    return rc < 0 ? rc : engine_look_at_devices(e);
+}
+
 static int warm_up(struct engine *e)
 {
     int rc = wait_until_emitting(e);
@@ -161,10 +170,8 @@ static int warm_up(struct engine *e)
         if (engine_pause_asked(e))
             return engine_operator_paused(e);
         rc = engine_nap(e, left_ns < CLK_MS(100) ? left_ns : CLK_MS(100));
-        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns) {
-            rc = engine_check_laser(e);
-            rc = rc < 0 ? rc : check_axes(e);
-        }
+        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
+            rc = look_around(e);
     }
     if (rc >= 0)
         rc = instrument_fit_monitor(e->in, &e->why);

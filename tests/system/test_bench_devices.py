@@ -153,6 +153,23 @@ def test_an_unplugged_wheel_pauses_the_run_until_it_is_back_and_set(bench, daemo
     assert nd["returns"] == 1 and nd["errors"] >= 1
 
 
+@pytest.mark.parametrize("part, name", [("shutter", "shutter"), ("wheel", "nd")])
+def test_what_is_unplugged_while_the_laser_warms_up_pauses_the_run(bench, start_daemon, part, name):
+    text, count = re.subn(r"warmup_s = [0-9.]+", "warmup_s = 600.0", bench.file.read_text())
+    assert count == 1
+    bench.file.write_text(text)
+    d = start_daemon("--config", bench.file)
+    reply = d.submit(PLAN, "devices.cfg")
+    events = d.follow(0)
+    events.until(lambda e: e["event"] == "log" and "warming up" in e["text"], 60.0)
+    wait_for(lambda: bench.sim.control(do="state")["laser"]["emission"])
+    sim = getattr(bench, part)
+    assert sim.control(do="unplug", wire=sim.folder.name)["ok"]
+    paused = events.until_state(reply["run"], "paused")
+    assert name in paused["text"] and "unplugged" in paused["text"], paused
+    assert not bench.sim.control(do="state")["laser"]["emission"]
+
+
 def test_a_stuck_shutter_pauses_the_run_with_the_laser_off(bench, daemon):
     assert bench.shutter.control(do="set", values={"interlock": 1})["ok"]  # its blades stay closed
     reply = daemon.submit(PLAN, "devices.cfg")
