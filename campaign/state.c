@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "campaign/state.h"
 
+#include "campaign/store_watch.h"
+
 #include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,6 +16,7 @@ enum {
 
 struct state {
     sqlite3 *db;
+    struct store_watch file; // as it was opened
     char path[512];
 };
 
@@ -97,7 +100,9 @@ static int open_db(struct state *s, struct gon_error *err)
         return fail(s, err);
     sqlite3_busy_timeout(s->db, STATE_PATIENCE_MS);
     int rc = run(s, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL", err);
-    return rc < 0 ? rc : check_tables(s, err);
+    rc = rc < 0 ? rc : check_tables(s, err);
+    store_watch_begin(&s->file, s->path);
+    return rc;
 }
 
 int state_open(const char *directory, struct state **ret_state, struct gon_error *err)
@@ -203,9 +208,20 @@ static int replace(struct state *s, const struct state_queue *q, struct gon_erro
     return rc;
 }
 
+// A file that was removed or replaced would take what is written with it.
+static int find_again(struct state *s, struct gon_error *err)
+{
+    if (s->db && store_watch_look(&s->file, s->path) != STORE_SEEN_OTHER)
+        return GON_OK;
+    sqlite3_close(s->db);
+    s->db = NULL;
+    return open_db(s, err);
+}
+
 int state_write_queue(struct state *s, const struct state_queue *q, struct gon_error *err)
 {
-    int rc = run(s, "BEGIN IMMEDIATE", err);
+    int rc = find_again(s, err);
+    rc = rc < 0 ? rc : run(s, "BEGIN IMMEDIATE", err);
     if (rc < 0)
         return rc;
     rc = replace(s, q, err);

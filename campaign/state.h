@@ -34,4 +34,5 @@ int state_open(const char *directory, struct state **ret_state, struct gon_error
 void state_close(struct state *s); // NULL is fine
 
 int state_read_queue(struct state *s, struct state_queue **ret_queue, struct gon_error *err);
+// Also when the file was removed meanwhile: it is made again.
 int state_write_queue(struct state *s, const struct state_queue *q, struct gon_error *err);

@@ -2,13 +2,13 @@
 #include "daemon/guardian.h"
 
 #include "base/paths.h"
+#include "daemon/child.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -20,7 +20,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { GUARD_FD = 3, END_MS = 1000 };
+enum { END_MS = 1000 };
 
 struct guardian {
     char stop[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
@@ -30,8 +30,6 @@ struct guardian {
     bool given;   // to the link
     bool crashes; // of ours are told to it
 };
-
-extern char **environ;
 
 // The one thing that a signal handler needs; written before there is a second thread, and by the
 // one that replaces a guard.
@@ -58,29 +56,15 @@ void guardian_when_crashed(struct guardian *g)
 
 // --- the process ---------------------------------------------------------------------------------
 
-// Of another session: Ctrl-C at the terminal is for the daemon, which ends in order. Its standard
-// output is nobody's, so that who reads ours sees its end.
+// Its standard output is nobody's, so that who reads ours sees its end; until it has blocked its
+// signals itself they are blocked as ours.
 static int spawn(struct guardian *g, int fd, struct gon_error *err)
 {
-    char program[PATH_MAX], number[] = {'0' + GUARD_FD, 0};
+    char program[PATH_MAX], number[] = {'0' + CHILD_GIVEN_FD, 0};
     char *argv[] = {program, number, g->stop, NULL};
-    posix_spawnattr_t attributes;
-    posix_spawn_file_actions_t actions;
-    sigset_t all;
-    sigfillset(&all);
+    const struct child c = {.argv = argv, .out_fd = -1, .err_fd = -1, .given_fd = fd, .blocked = true};
     paths_program("gonio-guard", program, sizeof program);
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGDEF);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDWR, 0);
-    posix_spawn_file_actions_adddup2(&actions, STDIN_FILENO, STDOUT_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, STDIN_FILENO, STDERR_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, fd, GUARD_FD);
-    posix_spawn_file_actions_addclosefrom_np(&actions, GUARD_FD + 1); // no other device's port
-    int rc = posix_spawnp(&g->pid, program, &actions, &attributes, argv, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
+    const int rc = child_start(&c, &g->pid);
     if (rc == 0)
         return 0;
     g->pid = 0;

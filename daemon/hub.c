@@ -45,6 +45,7 @@ struct hub {
     uint64_t stops[MOST_STOPS]; // tickets that wait for the end of a stop
     int stop_count;
     bool held; // somebody asked for the pause that the active run is in, or comes to
+    bool restored; // the queue of the earlier life, so that ours may take its place on the disk
     bool ready_said, listed, ending, ended_said;
 };
 
@@ -212,6 +213,8 @@ static void cancel_port(void *ctx)
 static void keep_port(void *ctx)
 {
     struct hub *h = ctx;
+    if (!h->restored)
+        return;
     struct queue_entry entries[MOST_KEPT];
     const size_t count = queue_entries(h->queue, entries, MOST_KEPT);
     struct note *n = note_new(NOTE_QUEUE);
@@ -554,6 +557,8 @@ static void restored(struct hub *h, const struct note *n)
     const struct state_queue *earlier = n->thing;
     for (size_t i = 0; earlier && i < earlier->count; i++)
         queue_restore(h->queue, earlier->entries[i].run, earlier->entries[i].held);
+    h->restored = true;
+    keep_port(h);
     if (queue_is_held(h->queue))
         log_say(h->options.log, LOG_NOTICE, "queue",
                 "held, as goniod was started anew; look: gonio queue, go on: gonio queue release");

@@ -3,12 +3,11 @@
 
 #include "base/clk.h"
 #include "base/log.h"
+#include "daemon/child.h"
 #include "daemon/loop.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,8 +17,6 @@
 #include <unistd.h>
 
 enum { LOOK_MS = 250, MOST_ARGUMENTS = 16, MOST_VARIABLES = 512, DETAILS = 5 };
-
-extern char **environ;
 
 struct telling {
     char sentence[800];
@@ -38,28 +35,6 @@ struct messenger {
 };
 
 // --- one command ---------------------------------------------------------------------------------
-
-static int spawn(char **argv, char **environment, pid_t *ret_pid)
-{
-    posix_spawnattr_t attributes;
-    posix_spawn_file_actions_t actions;
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes,
-                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-    posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1); // no device's port
-    const int rc = posix_spawn(ret_pid, argv[0], &actions, &attributes, argv, environment);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-    return rc;
-}
 
 // Ours, and before it the details; an earlier value of the same name loses.
 static void make_environment(struct telling *t, char *environment[MOST_VARIABLES])
@@ -84,7 +59,8 @@ static bool start(struct messenger *m)
     argv[argc++] = m->waiting[0].sentence;
     argv[argc] = NULL;
     make_environment(&m->waiting[0], environment);
-    const int error = spawn(argv, environment, &m->pid);
+    const struct child c = {argv, environment, STDERR_FILENO, STDERR_FILENO, -1, false};
+    const int error = child_start(&c, &m->pid);
     if (error) {
         m->pid = 0;
         log_say(m->log, LOG_WARN, "notify", "%s does not start: %s; see daemon.notify in the bench file",

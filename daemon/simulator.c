@@ -3,6 +3,7 @@
 
 #include "base/clk.h"
 #include "base/paths.h"
+#include "daemon/child.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -10,7 +11,6 @@
 #include <limits.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,8 +27,6 @@ struct simulator {
     int pid_fd, out_fd;
 };
 
-extern char **environ;
-
 static int make_folder(struct simulator *s, struct gon_error *err)
 {
     const char *runtime = getenv("XDG_RUNTIME_DIR");
@@ -44,26 +42,11 @@ static int make_folder(struct simulator *s, struct gon_error *err)
     return GON_OK;
 }
 
-// Its own session: Ctrl-C at the terminal is for the daemon, which needs the laser to answer once
-// more.
 static int spawn(struct simulator *s, char **argv, int out_fd, struct gon_error *err)
 {
-    posix_spawnattr_t attributes;
-    posix_spawn_file_actions_t actions;
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes,
-                             POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, out_fd, STDOUT_FILENO);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    int rc = posix_spawnp(&s->pid, argv[0], &actions, &attributes, argv, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
+    const struct child c = {
+        .argv = argv, .out_fd = out_fd, .err_fd = STDERR_FILENO, .given_fd = -1};
+    const int rc = child_start(&c, &s->pid);
     if (rc == 0)
         return GON_OK;
     s->pid = 0;

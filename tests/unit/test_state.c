@@ -136,6 +136,23 @@ static void a_newer_file_is_refused(void **state)
     state_close(open_state(*state));
 }
 
+static void a_removed_file_is_made_again(void **state)
+{
+    const struct folder *f = *state;
+    struct state *s = open_state(f);
+    char other[80];
+    write_runs(s, 3, 2);
+    assert_int_equal(unlink(f->file), 0);
+    write_runs(s, 4, 3);
+    snprintf(other, sizeof other, "%s.moved", f->file);
+    assert_int_equal(rename(f->file, other), 0);
+    write_runs(s, 5, 4);
+    state_close(s);
+    s = open_state(f);
+    check_runs(s, 5, 4);
+    state_close(s);
+}
+
 static void what_is_no_state_is_left_alone(void **state)
 {
     const struct folder *f = *state;
@@ -159,6 +176,7 @@ int main(void)
         TEST(the_queue_comes_back_in_its_order),
         TEST(what_cannot_be_written_changes_nothing),
         TEST(a_newer_file_is_refused),
+        TEST(a_removed_file_is_made_again),
         TEST(what_is_no_state_is_left_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
