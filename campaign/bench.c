@@ -259,6 +259,8 @@ const struct cfg_row bench_config_schema[] = {
              "detector; instead of detector.monitor_aux."},
     MANY("devices", devices, BENCH_DEVICES, bench_device, bench_device_rows, "",
          "Shutters, filter wheels, choppers and other selectors, and inputs."),
+    MANY("suspenders", suspenders, BENCH_SUSPENDERS, bench_suspender, bench_suspender_rows, "",
+         "Conditions under which a run pauses in the safe state."),
     {.name = "polarisation",
      .type = CFG_GROUP,
      .offset = offsetof(struct bench_config, polarisation),

@@ -6,6 +6,7 @@
 #include "base/err.h"
 #include "campaign/bench_devices.h"
 #include "campaign/bench_states.h"
+#include "campaign/bench_suspend.h"
 #include "campaign/kinematics.h"
 #include "campaign/polarisation.h"
 
@@ -134,6 +135,8 @@ struct bench_config {
     struct bench_monitor monitor;
     struct bench_device devices[BENCH_DEVICES];
     int devices_count;
+    struct bench_suspender suspenders[BENCH_SUSPENDERS];
+    int suspenders_count;
     struct bench_polarisation polarisation;
     struct bench_station stations[BENCH_STATIONS];
     int stations_count;

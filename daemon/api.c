@@ -14,6 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 
+enum { MOST_REASON = 160 };
+
 struct call {
     struct hub *hub;
     const struct http_request *request;
@@ -117,6 +119,8 @@ static struct http_reply get_status(const struct call *c)
     json_object_set_new(o, "control", view_control(hub_control(c->hub)));
     json_object_set_new(o, "queue_held", json_boolean(queue_is_held(q)));
     json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
+    json_object_set_new(o, "suspenders",
+                        s.snapshot ? view_suspenders(s.snapshot) : json_array());
     json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
     return reply(200, view_text(o));
 }
@@ -246,10 +250,45 @@ static struct http_reply told(const struct call *c, int run, const struct gon_er
     return reply(202, hub_submitted(c->hub, run, hub_event_id(c->hub)));
 }
 
+// " anna (uid 1000): lunch": behind "by the operator".
+static void say_who(const struct call *c, const char *reason, char *text, size_t size)
+{
+    snprintf(text, size, "%s%s (uid %ld)%s%s", *c->request->name ? " " : "", c->request->name,
+             c->request->uid, *reason ? ": " : "", reason);
+}
+
+// One line, which is shown and kept: no control characters.
+static bool is_line(const char *text, size_t most)
+{
+    for (const char *p = text; *p; p++)
+        if ((unsigned char)*p < ' ' || *p == 0x7f)
+            return false;
+    return strlen(text) <= most;
+}
+
 static struct http_reply post_pause(const struct call *c)
 {
+    json_error_t e;
     struct gon_error err;
-    int run = hub_pause(c->hub, &err);
+    char by[300];
+    const char *reason = "";
+    int now = 0;
+    json_t *body = c->request->size ? json_loadb(c->request->body, c->request->size,
+                                                 JSON_REJECT_DUPLICATES, &e)
+                                    : json_object();
+    if (!body ||
+        json_unpack_ex(body, &e, JSON_STRICT, "{s?b, s?s}", "now", &now, "reason", &reason) < 0 ||
+        !is_line(reason, MOST_REASON)) {
+        struct http_reply r =
+            fail(400, body && is_line(reason, MOST_REASON) ? e.text : "the reason is no short line",
+                 "the request's body",
+                 "send {\"now\": true|false, \"reason\": one line of at most 160 bytes}");
+        json_decref(body);
+        return r;
+    }
+    say_who(c, reason, by, sizeof by);
+    const int run = hub_pause(c->hub, by, now, &err);
+    json_decref(body);
     return told(c, run, &err);
 }
 

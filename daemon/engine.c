@@ -12,6 +12,7 @@
 #include "daemon/engine_inside.h"
 #include "daemon/instrument.h"
 #include "daemon/instrument_devices.h"
+#include "daemon/instrument_suspend.h"
 #include "daemon/travel.h"
 
 #include <math.h>
@@ -344,11 +345,17 @@ static int measure(struct engine *e, const struct travel_pose *at)
 static int do_point(struct engine *e)
 {
     struct travel_pose at;
+    e->interrupt = (struct gon_error){GON_OK};
+    e->suspended = false;
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
     if (engine_pause_asked(e))
         return engine_operator_paused(e);
-    int rc = prepare(e);
+    e->heeding = true;
+    int rc = engine_suspended(e);
+    instrument_steady(e->in, false);
+    if (rc >= 0)
+        rc = prepare(e);
     if (rc >= 0)
         rc = instrument_watch_inputs(e->in, &e->why);
     if (rc >= 0 && !e->lit && e->point->kind != PLAN_DARK && instrument_bench(e->in)->devices_count)
@@ -367,6 +374,7 @@ static int do_point(struct engine *e)
         e->acquire.range = -1;
     if (at.still_ns > e->light_ns)
         e->light_ns = at.still_ns;
+    instrument_steady(e->in, e->lit && !e->dark);
     return measure(e, &at);
 }
 
@@ -395,11 +403,12 @@ static const struct plan_point *next_point(const struct plan *plan, const struct
 static int see_through(struct engine *e)
 {
     for (;;) {
-        int rc = do_point(e);
+        int rc = engine_interrupted(e, do_point(e));
+        e->heeding = false;
         if (rc == AGAIN)
             continue;
         if (rc >= 0) {
-            e->returns = 0;
+            e->returns = e->tries = 0;
             return 0;
         }
         if (rc == GON_E_CANCELED || rc == GON_E_INPUT || rc == GON_E_SYSTEM)
@@ -473,8 +482,11 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
     instrument_obey(instrument, ports->cancel);
+    instrument_heed(instrument, engine_heed, &e);
+    instrument_release(instrument); // whoever starts it has seen to the bench
     engine_enter(&e, RUN_PREPARING, NULL);
     const enum run_state ended = finish(&e, run_points(&e), err);
+    instrument_heed(instrument, NULL, NULL);
     instrument_obey(instrument, NULL);
     return ended;
 }

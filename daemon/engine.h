@@ -13,7 +13,9 @@
 // gone or does not answer pauses the run in a safe state (emission off where the laser can be
 // reached, axes stopped) and it goes on by itself once the device is back and identified, from the
 // point in progress; an interlock, a device's fault or a refused command pauses until somebody
-// resumes. Each reading is acknowledged by the store before the next point begins.
+// resumes. So does a
+// suspender of the bench (daemon/suspend.h), also in the middle of a point: that attempt is given
+// up, and nothing of it is stored. Each reading is acknowledged by the store before the next point begins.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -69,6 +71,12 @@ struct engine_opening {
     double beam_signal_v[POL_COUNT], beam_monitor_v[POL_COUNT];
 };
 
+// A pause as somebody asked for it.
+struct engine_asked {
+    bool now;     // the point in progress is given up; otherwise between two points
+    char by[300]; // " anna (uid 1000): lunch"; "": nobody knows
+};
+
 // While a port waits it calls instrument_breathe at least every 100 ms: the laser's lease.
 struct engine_ports {
     void *ctx;
@@ -85,8 +93,8 @@ struct engine_ports {
     void (*publish)(void *ctx, const struct engine_event *event);
     void (*request_fit)(void *ctx, int sweep, bool last); // does not wait
     bool (*take_resume)(void *ctx); // true once after an operator's "resume"; asked while paused
-    bool (*take_pause)(void *ctx);  // true once after an operator's "pause"; asked between readings
-                                   // and while warming up. NULL: nobody pauses
+    // True once after an operator's "pause"; asked all the time. NULL: nobody pauses.
+    bool (*take_pause)(void *ctx, struct engine_asked *ret_asked);
 };
 
 // Runs the plan from its first point without an accepted reading (the plan carries what is done).

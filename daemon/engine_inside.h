@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_light.c (the
-// laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
+// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_suspend.c (suspenders
+// and interruptions), engine_light.c (the laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
 // filter wheels and the like) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
@@ -23,6 +23,12 @@ struct engine {
     bool dark;   // laser off, read back at this campaign's own request; or the shutter closed that
                  // makes the darks
     bool wanted; // the pause is the operator's
+    bool asking; // somebody asked for a pause, as asked says
+    struct engine_asked asked;
+    bool heeding;              // waits may be interrupted: a point is in progress
+    bool suspended;            // by a suspender, as why says
+    struct gon_error interrupt; // why a wait of this point was; code 0: none was
+    int tries;   // of a suspender that only light shows, since the last accepted reading
     int returns; // pauses that ended by themselves since the last accepted reading
     int64_t light_ns, source_ns, laser_look_ns; // light_ns: also of arrivals
     struct acquire acquire;
@@ -57,6 +63,15 @@ void engine_enter_pause(struct engine *e, const char *text);
 int engine_pause_run(struct engine *e);
 bool engine_pause_asked(struct engine *e);    // true once
 int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
+int engine_wait_for_operator(struct engine *e);
+int engine_take_over(struct engine *e); // of a pause that would end by itself: the operator's now
+
+// --- engine_suspend.c ---
+int engine_suspended(struct engine *e); // looks; GON_E_REFUSED: one keeps the run
+bool engine_heed(void *ctx);            // for instrument_heed; ctx: the engine
+// What a point ended with: where that was an interruption, why; else rc.
+int engine_interrupted(struct engine *e, int rc);
+int engine_sit_out(struct engine *e); // a suspender's pause. 0: go on; GON_E_CANCELED
 
 // --- engine_elements.c ---
 // To the point's states; what stands there already is only looked at, now and then.

@@ -355,23 +355,31 @@ bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
     return room;
 }
 
-static int to_active(struct hub *h, enum note_kind kind, unsigned states, struct gon_error *err)
+// The note is given away.
+static int to_active(struct hub *h, struct note *n, unsigned states, struct gon_error *err)
 {
     const struct run *run = queue_active(h->queue);
+    int rc = GON_OK;
     if (!run)
-        return gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
-    if (!(states & 1u << run->state))
-        return gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
-                        run_state_name(run->state));
-    note_post(h->run_box, note_new(kind));
-    return run->id;
+        rc = gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
+    else if (!(states & 1u << run->state))
+        rc = gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
+                      run_state_name(run->state));
+    if (rc < 0)
+        note_free(n);
+    else
+        note_post(h->run_box, n);
+    return rc < 0 ? rc : run->id;
 }
 
 // One that waits for a device would go on by itself: it can be held too, once.
-int hub_pause(struct hub *h, struct gon_error *err)
+int hub_pause(struct hub *h, const char *by, bool now, struct gon_error *err)
 {
     const unsigned waits = h->held ? 0 : 1u << RUN_PAUSED;
-    int rc = to_active(h, NOTE_PAUSE, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, err);
+    struct note *n = note_new(NOTE_PAUSE);
+    n->text = note_text(by);
+    n->last = now;
+    int rc = to_active(h, n, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, err);
     h->held = h->held || rc > 0;
     return rc;
 }
@@ -383,7 +391,7 @@ int hub_resume(struct hub *h, struct gon_error *err)
         queue_hold(h->queue, 0, false, NULL);
         return first.run->id;
     }
-    return to_active(h, NOTE_RESUME, 1u << RUN_PAUSED, err);
+    return to_active(h, note_new(NOTE_RESUME), 1u << RUN_PAUSED, err);
 }
 
 // --- who commands --------------------------------------------------------------------------------
@@ -589,7 +597,8 @@ static int start_workers(struct hub *h, struct gon_error *err)
                              h->options.directory, h->store_box,        h->box,
                              h->run_box,           h->options.profiles, h->options.profiles_count};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
-    struct runner_links r = {h->options.bench, h->cancel, h->run_box, h->box, h->store_box};
+    struct runner_links r = {h->options.bench, h->cancel, h->options.directory,
+                             h->run_box,       h->box,    h->store_box};
     int rc = storer_start(&s, &h->storer, err);
     rc = rc < 0 ? rc : fitter_start(&f, &h->fitter, err);
     return rc < 0 ? rc : runner_start(&r, &h->runner, err);

@@ -17,6 +17,7 @@ struct runner;
 struct runner_links {
     const struct bench_config *bench;
     const struct cancel *cancel; // ends a run
+    const char *directory;       // of the campaigns: its disk is watched
     struct mail *box;            // the thread's own
     struct mail *to_main, *to_store;
 };

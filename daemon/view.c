@@ -184,6 +184,20 @@ json_t *view_devices(const struct instrument_snapshot *s)
     return all;
 }
 
+json_t *view_suspenders(const struct instrument_snapshot *s)
+{
+    json_t *all = json_array();
+    for (int i = 0; i < BENCH_SUSPENDERS && s->suspender[i].name; i++) {
+        const struct suspender_state *one = &s->suspender[i];
+        json_t *o = json_pack("{s:s, s:s, s:b, s:b, s:b, s:s}", "name", one->name, "resume",
+                              one->manual ? "manual" : "automatic", "holds", one->holds, "keeps",
+                              one->keeps, "waits", one->waits, "text", one->text);
+        json_object_set_new(o, "left_s", view_number(one->left_s));
+        json_array_append_new(all, o);
+    }
+    return all;
+}
+
 char *view_text(json_t *o)
 {
     char *text = o ? json_dumps(o, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;

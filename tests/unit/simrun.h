@@ -36,6 +36,7 @@ struct run {
 
     // the script
     bool auto_resume, want_resume, want_pause;
+    struct engine_asked asked; // of the next pause
     int store_fails; // so many times in a row, from row store_fail_at on
     int store_fail_at;
     bool store_carries_out;        // and the row is there nevertheless
@@ -201,11 +202,13 @@ static inline bool port_resume(void *ctx)
     return now;
 }
 
-static inline bool port_pause(void *ctx)
+static inline bool port_pause(void *ctx, struct engine_asked *ret_asked)
 {
     struct run *r = ctx;
     bool now = r->want_pause;
     r->want_pause = false;
+    if (now)
+        *ret_asked = r->asked;
     return now;
 }
 
