@@ -241,9 +241,10 @@ static void it_pauses_within_a_second_and_goes_on_when_quiet(void **state)
     assert_true(lit > 20); // most of them while the laser was on
 }
 
-static void one_that_holds_keeps_the_laser_off_from_the_start(void **state)
+static void one_that_holds_keeps_everything_still_from_the_start(void **state)
 {
     (void)state;
+    struct instrument_snapshot snapshot;
     struct run *r = begin_with("disk", "disk_free_mb < 500", 20, BENCH_AUTOMATIC);
     scene.free_mb = 1;
     scene.from_ns = 0;
@@ -253,6 +254,8 @@ static void one_that_holds_keeps_the_laser_off_from_the_start(void **state)
     assert_int_equal(r->b.ons, 0);
     assert_int_equal(r->rows, 0);
     assert_int_equal(r->pauses_count, 1);
+    instrument_snapshot(r->in, &snapshot);
+    assert_false(snapshot.axis[0].homed);
     end(r);
 }
 
@@ -461,7 +464,7 @@ int main(void)
         cmocka_unit_test(terms_hold_at_their_limits_and_when_nothing_is_known),
         cmocka_unit_test(one_that_holds_keeps_until_it_was_quiet_and_was_released),
         cmocka_unit_test(it_pauses_within_a_second_and_goes_on_when_quiet),
-        cmocka_unit_test(one_that_holds_keeps_the_laser_off_from_the_start),
+        cmocka_unit_test(one_that_holds_keeps_everything_still_from_the_start),
         cmocka_unit_test(a_manual_one_waits_for_somebody_and_not_for_who_came_too_early),
         cmocka_unit_test(an_interlock_never_resumes_by_itself),
         cmocka_unit_test(one_opened_while_a_device_is_away_is_not_forgotten),
