@@ -3,6 +3,7 @@
 
 #include "base/units.h"
 #include "campaign/reduce_elements.h"
+#include "campaign/reduce_series.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -126,86 +127,118 @@ static double sample_u_v(const struct reduce_noise *n, double signal_v)
 
 // --- references ----------------------------------------------------------------------------------
 
-// Mean and standard uncertainty of the mean of a few values, from their scatter: 0 for a single
-// one.
-struct mean {
-    double sum, sum2;
-    int n;
-};
-
-static void mean_add(struct mean *m, double value)
-{
-    m->sum += value;
-    m->sum2 += value * value;
-    m->n++;
-}
-
-static double mean_of(const struct mean *m)
-{
-    return m->n ? m->sum / m->n : (double)NAN;
-}
-
-static double mean_u(const struct mean *m)
-{
-    if (m->n < 2)
-        return 0;
-    return sqrt(fmax(0, m->sum2 - m->sum * m->sum / m->n) / (m->n - 1) / m->n);
-}
-
 static double without_nan(double value)
 {
     return isnan(value) ? 0 : value;
 }
 
 struct beam {
-    struct mean signal, monitor, ratio;
+    struct reduce_series signal, monitor, ratio;
     int samples, out; // out: what stood before the detector
 };
 
 struct references {
-    struct mean dark_signal, dark_monitor;
+    struct reduce_series dark_signal, dark_monitor;
     int dark_samples;
     struct beam beam[POL_COUNT]; // by the light's state
+    bool again;                  // one was measured again, after a gap
 };
 
-static void add_darks(struct references *f, const struct plan *plan,
-                      const struct store_reading *rows, int count, int last_sweep)
+// The next accepted reading of the point; NULL: no more.
+static const struct store_reading *next_of(const struct plan_point *p,
+                                           const struct store_reading *rows, int count, int *at)
 {
-    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
-        const struct store_reading *r = reading_of(&plan->points[i], rows, count, &at);
-        if (!r || plan->points[i].kind != PLAN_DARK)
-            continue;
-        mean_add(&f->dark_signal, r->signal_v);
-        mean_add(&f->dark_monitor, r->monitor_v);
-        f->dark_samples += r->count;
+    for (; *at < count && rows[*at].sweep == p->sweep && rows[*at].point == p->point; (*at)++)
+        if (accepted(&rows[*at]))
+            return &rows[(*at)++];
+    return NULL;
+}
+
+static int add_dark(struct references *f, const struct store_reading *r, struct gon_error *err)
+{
+    int rc = reduce_series_add(&f->dark_signal, r->t_utc_ms, r->signal_v, err);
+    f->dark_samples += r->count;
+    return rc < 0 ? rc : reduce_series_add(&f->dark_monitor, r->t_utc_ms, r->monitor_v, err);
+}
+
+static int add_beam(struct references *f, const struct plan_point *p, const struct store_reading *r,
+                    struct gon_error *err)
+{
+    struct beam *b = &f->beam[p->pol_in];
+    const double dark_signal = reduce_series_at(&f->dark_signal, r->t_utc_ms);
+    const double dark_monitor = reduce_series_at(&f->dark_monitor, r->t_utc_ms);
+    const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
+    int rc = reduce_series_add(&b->signal, r->t_utc_ms, r->signal_v, err);
+    rc = rc < 0 ? rc : reduce_series_add(&b->monitor, r->t_utc_ms, r->monitor_v, err);
+    b->samples += r->count;
+    b->out = p->pol_out;
+    b->ratio.interpolated = f->again;
+    return rc < 0 ? rc
+                  : reduce_series_add(&b->ratio, r->t_utc_ms,
+                                      (r->signal_v - dark_signal) / monitor, err);
+}
+
+static bool was_measured_again(const struct plan *plan, const struct store_reading *rows, int count)
+{
+    for (int i = 0, at = 0; i < plan->count; i++) {
+        int good = 0;
+        while (next_of(&plan->points[i], rows, count, &at))
+            good++;
+        if (plan->points[i].kind != PLAN_SAMPLE && good > 1)
+            return true;
+    }
+    return false;
+}
+
+static int add_references(struct references *f, enum plan_kind kind, const struct plan *plan,
+                          const struct store_reading *rows, int count, struct gon_error *err)
+{
+    const struct store_reading *r;
+    int rc = GON_OK;
+    for (int i = 0, at = 0; i < plan->count && rc >= 0; i++) {
+        const struct plan_point *p = &plan->points[i];
+        while (rc >= 0 && (r = next_of(p, rows, count, &at)))
+            rc = p->kind != kind     ? GON_OK
+                 : kind == PLAN_DARK ? add_dark(f, r, err)
+                                     : add_beam(f, p, r, err);
+    }
+    return rc;
+}
+
+// The darks first: the beams are over them.
+static int collect(struct references *f, const struct plan *plan, const struct store_reading *rows,
+                   int count, struct gon_error *err)
+{
+    f->again = was_measured_again(plan, rows, count);
+    f->dark_signal.interpolated = f->dark_monitor.interpolated = f->again;
+    int rc = add_references(f, PLAN_DARK, plan, rows, count, err);
+    return rc < 0 ? rc : add_references(f, PLAN_BEAM, plan, rows, count, err);
+}
+
+static void clear_references(struct references *f)
+{
+    reduce_series_clear(&f->dark_signal);
+    reduce_series_clear(&f->dark_monitor);
+    for (int i = 0; i < POL_COUNT; i++) {
+        reduce_series_clear(&f->beam[i].signal);
+        reduce_series_clear(&f->beam[i].monitor);
+        reduce_series_clear(&f->beam[i].ratio);
     }
 }
 
-static void add_beams(struct references *f, const struct plan *plan,
-                      const struct store_reading *rows, int count, int last_sweep)
+// Of those that a value rests on: all of a mean, one group of them when they are interpolated.
+static double samples_of(const struct reduce_series *s, int samples)
 {
-    const double dark_signal = mean_of(&f->dark_signal), dark_monitor = mean_of(&f->dark_monitor);
-    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep <= last_sweep; i++) {
-        const struct plan_point *p = &plan->points[i];
-        const struct store_reading *r = reading_of(p, rows, count, &at);
-        if (!r || p->kind != PLAN_BEAM)
-            continue;
-        struct beam *b = &f->beam[p->pol_in];
-        const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
-        mean_add(&b->signal, r->signal_v);
-        mean_add(&b->monitor, r->monitor_v);
-        mean_add(&b->ratio, (r->signal_v - dark_signal) / monitor);
-        b->samples += r->count;
-        b->out = p->pol_out;
-    }
+    return s->interpolated && s->count ? (double)samples / s->count : samples;
 }
 
 static struct reduce_reference means(const struct references *f)
 {
-    struct reduce_reference r = {mean_of(&f->dark_signal), mean_of(&f->dark_monitor), {0}, {0}};
+    struct reduce_reference r = {
+        reduce_series_mean(&f->dark_signal), reduce_series_mean(&f->dark_monitor), {0}, {0}};
     for (int i = 0; i < POL_COUNT; i++) {
-        r.beam_signal_v[i] = mean_of(&f->beam[i].signal);
-        r.beam_monitor_v[i] = mean_of(&f->beam[i].monitor);
+        r.beam_signal_v[i] = reduce_series_mean(&f->beam[i].signal);
+        r.beam_monitor_v[i] = reduce_series_mean(&f->beam[i].monitor);
     }
     return r;
 }
@@ -213,10 +246,21 @@ static struct reduce_reference means(const struct references *f)
 struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
                                        int count)
 {
-    struct references f = {0};
-    add_darks(&f, plan, rows, count, 0);
-    add_beams(&f, plan, rows, count, 0);
-    return means(&f);
+    struct reduce_reference o = {(double)NAN, (double)NAN, {0}, {0}};
+    for (int i = 0; i < POL_COUNT; i++)
+        o.beam_signal_v[i] = o.beam_monitor_v[i] = (double)NAN;
+    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep == 0; i++) {
+        const struct plan_point *p = &plan->points[i];
+        const struct store_reading *r = reading_of(p, rows, count, &at);
+        if (r && p->kind == PLAN_DARK) {
+            o.dark_signal_v = r->signal_v;
+            o.dark_monitor_v = r->monitor_v;
+        } else if (r && p->kind == PLAN_BEAM) {
+            o.beam_signal_v[p->pol_in] = r->signal_v;
+            o.beam_monitor_v[p->pol_in] = r->monitor_v;
+        }
+    }
+    return o;
 }
 
 // --- points --------------------------------------------------------------------------------------
@@ -227,16 +271,21 @@ static double cosine(const struct reduction *r, const struct reduced_point *p)
 }
 
 // False when this point has no value: at or below the horizon, or with the light gone.
-static bool reduce_point(const struct reduction *r, const struct store_reading *row,
-                         const struct reduce_channel *channel, struct reduced_point *p)
+static bool reduce_point(const struct reduction *r, const struct references *f,
+                         const struct store_reading *row, const struct reduce_channel *channel,
+                         struct reduced_point *p)
 {
+    const int64_t t_ms = row->t_utc_ms;
+    const struct reduce_series *ratio = &f->beam[p->pol_in].ratio;
+    const double dark_monitor_v = reduce_series_at(&f->dark_monitor, t_ms);
+    const double beam_ratio =
+        channel->beam_ratio * (reduce_series_at(ratio, t_ms) / reduce_series_mean(ratio));
     const double monitor =
-        isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(r->reference.dark_monitor_v);
-    const double scale =
-        1 / (channel->beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
+        isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(dark_monitor_v);
+    const double scale = 1 / (beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
     if (!(cosine(r, p) > 1e-6) || !(monitor > 0))
         return false;
-    p->f_per_sr = scale * (row->signal_v - r->reference.dark_signal_v) / monitor;
+    p->f_per_sr = scale * (row->signal_v - reduce_series_at(&f->dark_signal, t_ms)) / monitor;
     const double u_signal = sample_u_v(&r->noise, row->signal_v) / sqrt(row->count);
     const double u_monitor = r->noise.rel_monitor / sqrt(row->count);
     p->u_a_per_sr = hypot(scale * hypot(u_signal, r->u_dark_v) / monitor, p->f_per_sr * u_monitor);
@@ -244,7 +293,7 @@ static bool reduce_point(const struct reduction *r, const struct store_reading *
     return isfinite(p->f_per_sr);
 }
 
-static int reduce_points(struct reduction *r, const struct plan *plan,
+static int reduce_points(struct reduction *r, const struct references *f, const struct plan *plan,
                          const struct store_reading *rows, int count, struct gon_error *err)
 {
     r->points = calloc((size_t)plan->samples + 1, sizeof *r->points);
@@ -265,7 +314,7 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
                                     .theta_i_deg = units_deg_of_udeg(row->theta_i_udeg),
                                     .theta_r_deg = units_deg_of_udeg(row->theta_r_udeg),
                                     .weight = point->weight};
-        if (reduce_point(r, row, reduce_channel_of(r, p->pol_in, p->pol_out), p))
+        if (reduce_point(r, f, row, reduce_channel_of(r, p->pol_in, p->pol_out), p))
             r->count++;
         else
             r->left_out++;
@@ -277,12 +326,13 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
 
 static int reduce_dark(struct reduction *r, const struct references *f, struct gon_error *err)
 {
-    r->darks = f->dark_signal.n;
+    r->darks = f->dark_signal.count;
     for (int i = 0; i < POL_COUNT; i++)
-        r->beams += f->beam[i].signal.n;
+        r->beams += f->beam[i].signal.count;
     r->reference = means(f);
     r->u_dark_v =
-        hypot(mean_u(&f->dark_signal), without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
+        hypot(reduce_series_u(&f->dark_signal),
+              without_nan(r->noise.floor_v) / sqrt(samples_of(&f->dark_signal, f->dark_samples)));
     if (!r->darks || !r->beams)
         return gon_fail(err, GON_E_INPUT, "no %s reading yet: without it there is no absolute BRDF",
                         r->darks ? "beam" : "dark");
@@ -292,13 +342,13 @@ static int reduce_dark(struct reduction *r, const struct references *f, struct g
 static int check_beam(const struct reduction *r, const struct beam *beam, int pol_in,
                       struct gon_error *err)
 {
-    const double ratio = mean_of(&beam->ratio);
-    if (!beam->signal.n)
+    const double ratio = reduce_series_mean(&beam->ratio);
+    if (!beam->signal.count)
         return gon_fail(err, GON_E_INPUT,
                         "no beam reading yet of pol_in = \"%s\": without it there is no absolute "
                         "BRDF",
                         polarisation_name((enum polarisation)pol_in));
-    if (ratio > 0 && isfinite(ratio))
+    if (reduce_series_least(&beam->ratio) > 0 && isfinite(ratio))
         return GON_OK;
     return gon_fail(err, GON_E_INPUT,
                     "the beam (%.4g V, monitor %.4g V) is not above the dark (%.4g V, monitor "
@@ -316,15 +366,16 @@ static int add_channel(struct reduction *r, const struct references *f,
     int rc = check_beam(r, beam, p->pol_in, err);
     if (rc < 0)
         return rc;
-    const double ratio = mean_of(&beam->ratio), signal_v = r->reference.beam_signal_v[p->pol_in];
+    const double ratio = reduce_series_mean(&beam->ratio), signal_v = r->reference.beam_signal_v[p->pol_in];
     const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
     const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
     *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};
     c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
                                             &c->u_analyser_rel);
     c->beam_ratio /= bench_beam_passes(bench, &c->u_filter_rel);
-    c->u_beam_rel = hypot(mean_u(&beam->ratio) / ratio,
-                          hypot(noise, r->noise.rel_monitor) / sqrt(beam->samples));
+    c->u_beam_rel =
+        hypot(reduce_series_u(&beam->ratio) / ratio,
+              hypot(noise, r->noise.rel_monitor) / sqrt(samples_of(&beam->ratio, beam->samples)));
     c->u_scale_rel = hypot(hypot(c->u_beam_rel, hypot(c->u_analyser_rel, c->u_filter_rel)), shared);
     r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
     r->u_scale_rel = fmax(r->u_scale_rel, c->u_scale_rel);
@@ -354,17 +405,18 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
 {
     struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
     struct references f = {0};
-    add_darks(&f, plan, rows, count, plan->sweeps + 1);
-    add_beams(&f, plan, rows, count, plan->sweeps + 1);
     r.noise = reduce_noise_of(plan, rows, count);
     r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
     r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
     r.u_linearity_rel = bench->detector.u_linearity_rel;
-    int rc = reduce_dark(&r, &f, err);
+    int rc = collect(&f, plan, rows, count, err);
+    if (rc >= 0)
+        rc = reduce_dark(&r, &f, err);
     if (rc >= 0)
         rc = reduce_channels(&r, &f, bench, plan, err);
     if (rc >= 0)
-        rc = reduce_points(&r, plan, rows, count, err);
+        rc = reduce_points(&r, &f, plan, rows, count, err);
+    clear_references(&f);
     if (rc < 0)
         return rc;
     reduce_add_leaks(&r, plan, bench);

@@ -9,6 +9,11 @@
 // Opening and closing beam and dark are averaged; half their difference is part of their
 // uncertainty. Angles are those of the encoders.
 //
+// After a gap (a pause, a stop) the opening references are measured again: further accepted readings
+// of the same points. Each reading is then reduced with what the references before and after it
+// give, linear in time between them (campaign/reduce_series.h); their uncertainty has half of the
+// largest difference of neighbours, for all readings.
+//
 // Each reading is divided by the beam of its own pol_in, which is measured without analyser; f of
 // a reading behind the analyser is divided by its transmission T as well, so that f = 1/2 a^T F g
 // of an ideal one. Where the analyser cannot be taken out T cancels and what it passes of the
@@ -96,7 +101,7 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
 int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err);
 void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL is fine
 
-// Means of the opening references (sweep 0), for provisional values after a resume.
+// The newest opening references (sweep 0), for provisional values after a resume.
 struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
                                        int count);
 

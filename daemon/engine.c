@@ -22,7 +22,6 @@
 
 #define ATTEMPTS_MORE 3  // attempts at a point: the ranges and these
 #define MONITOR_LOST 0.5 // of the monitor after warm-up: below it the light is lost
-#define AGAIN 1          // not done, but nothing is wrong
 #define STORE_RETRY_NS CLK_S(1)
 
 const char *run_state_name(enum run_state s)
@@ -176,16 +175,14 @@ static void publish_reading(struct engine *e, const struct acquire_reading *r,
     e->ports->publish(e->ports->ctx, &event);
 }
 
-// Means of the opening references, as far as they go.
 static void remember(struct engine *e, const struct acquire_reading *r)
 {
+    e->last_utc_ms = r->utc_ns / 1000000;
     if (e->point->kind == PLAN_DARK) {
         e->monitor_dark_v = r->monitor_v;
-        if (isnan(e->opening.dark_signal_v)) {
-            e->opening.dark_signal_v = r->signal_v;
-            e->opening.dark_monitor_v = r->monitor_v;
-        }
-    } else if (e->point->kind == PLAN_BEAM && isnan(e->opening.beam_signal_v[e->point->pol_in])) {
+        e->opening.dark_signal_v = r->signal_v;
+        e->opening.dark_monitor_v = r->monitor_v;
+    } else if (e->point->kind == PLAN_BEAM) {
         e->opening.beam_signal_v[e->point->pol_in] = r->signal_v;
         e->opening.beam_monitor_v[e->point->pol_in] = r->monitor_v;
     }
@@ -324,7 +321,7 @@ static int measure(struct engine *e, const struct travel_pose *at)
             return rc;
         if (r.accepted) {
             remember(e, &r);
-            e->done++;
+            e->done += !e->referring;
             begin_pace(e);
         }
         publish_reading(e, &r, at);
@@ -337,12 +334,12 @@ static int measure(struct engine *e, const struct travel_pose *at)
         if (r.accepted || !r.again)
             break;
         if (!e->ready) // the store paused the run: light and axes first
-            return AGAIN;
+            return ENGINE_AGAIN;
     }
     return r.accepted ? 0 : no_more_attempts(e, &r);
 }
 
-static int do_point(struct engine *e)
+int engine_do_point(struct engine *e)
 {
     struct travel_pose at;
     e->interrupt = (struct gon_error){GON_OK};
@@ -403,9 +400,12 @@ static const struct plan_point *next_point(const struct plan *plan, const struct
 static int see_through(struct engine *e)
 {
     for (;;) {
-        int rc = engine_interrupted(e, do_point(e));
+        int rc = engine_refer(e);
+        if (rc >= 0)
+            rc = engine_do_point(e);
+        rc = engine_interrupted(e, rc);
         e->heeding = false;
-        if (rc == AGAIN)
+        if (rc == ENGINE_AGAIN)
             continue;
         if (rc >= 0) {
             e->returns = e->tries = 0;
@@ -428,6 +428,7 @@ static int run_points(struct engine *e)
         int rc = see_through(e);
         if (rc < 0)
             return rc;
+        engine_keep_attempt(e);
         next = next_point(e->plan, e->point);
         sweep_done(e, next);
     }
@@ -478,7 +479,10 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     if (ports->opening) {
         e.opening = *ports->opening;
         e.monitor_dark_v = e.opening.dark_monitor_v;
+        e.last_utc_ms = e.opening.last_utc_ms;
     }
+    e.gap = engine_has_beam(&e);
+    engine_count_attempts(&e);
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
     instrument_obey(instrument, ports->cancel);

@@ -15,7 +15,8 @@
 // point in progress; an interlock, a device's fault or a refused command pauses until somebody
 // resumes. So does a
 // suspender of the bench (daemon/suspend.h), also in the middle of a point: that attempt is given
-// up, and nothing of it is stored. Each reading is acknowledged by the store before the next point begins.
+// up, and nothing of it is stored. After a pause and when a campaign goes on, the opening references
+// are measured again before the next point on the sample (campaign/reduce.h). Each reading is acknowledged by the store before the next point begins.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -64,9 +65,10 @@ struct engine_event {
     const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
 
-// Means of the opening reference readings, for provisional f_r after a resume, the beam's by the
+// The newest opening reference readings, for provisional f_r after a resume, the beam's by the
 // light's state; NAN: not measured yet.
 struct engine_opening {
+    int64_t last_utc_ms; // of the newest reading of all
     double dark_signal_v, dark_monitor_v;
     double beam_signal_v[POL_COUNT], beam_monitor_v[POL_COUNT];
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_suspend.c (suspenders
-// and interruptions), engine_light.c (the laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
+// and interruptions), engine_reference.c (references after
+// a gap), engine_light.c (the laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
 // filter wheels and the like) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
@@ -8,6 +9,11 @@
 #include "daemon/instrument.h"
 
 struct plan_point;
+
+enum {
+    ENGINE_AGAIN = 1,                 // not done, but nothing is wrong
+    ENGINE_REFERENCES = 1 + POL_COUNT // dark, and the beam in each state of the light
+};
 
 struct engine {
     const struct engine_ports *ports;
@@ -37,7 +43,13 @@ struct engine {
     enum instrument_part strayed; // found elsewhere after the last reading; PART_COUNT: none
 
     double omega_sr, monitor_dark_v, monitor_lit_v;
-    struct engine_opening opening;
+    struct engine_opening opening; // the newest
+    bool gap;                      // the light was off since: they have to be measured again
+    bool referring;                // which is being done
+    double gap_s;                  // how long it was
+    struct engine_opening before;  // the gap
+    int attempts[ENGINE_REFERENCES]; // of the opening points
+    int64_t last_utc_ms;             // of the newest reading
     int64_t pace_ns; // when the sample's first point since the preparation was done; 0: none yet
     int pace_done;   // points done then
     struct gon_error why; // of the last failure
@@ -51,6 +63,15 @@ void engine_say(struct engine *e, enum engine_event_kind kind, const char *level
                 ...) __attribute__((format(printf, 4, 5)));
 // A state, for the file and for whoever watches; again the same without a text is no news.
 void engine_enter(struct engine *e, enum run_state state, const char *text);
+
+int engine_do_point(struct engine *e); // or ENGINE_AGAIN
+
+// --- engine_reference.c ---
+bool engine_has_beam(const struct engine *e);
+void engine_count_attempts(struct engine *e); // of the opening points, at the beginning
+void engine_keep_attempt(struct engine *e);   // of the point that is done
+// The opening references again, where there was a gap and the sample is next.
+int engine_refer(struct engine *e);
 
 // --- engine_pause.c ---
 int engine_canceled(struct engine *e);                 // GON_E_CANCELED

@@ -32,6 +32,7 @@ void engine_make_safe(struct engine *e)
     struct gon_error err;
     const bool was_on = instrument_light_left(e->in) == SAFETY_LIGHT_MAYBE;
     e->ready = e->lit = e->dark = e->heeding = false;
+    e->gap = e->gap || engine_has_beam(e);
     instrument_steady(e->in, false);
     instrument_permit(e->in, false);
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
