@@ -21,7 +21,8 @@ enum {
     BENCH_NAME = 32,
     BENCH_LINK = 256,
     BENCH_FOLDER = 256,
-    BENCH_NOTIFY = 12
+    BENCH_NOTIFY = 12,
+    BENCH_STEP = 160
 };
 
 enum bench_regime {
@@ -90,6 +91,8 @@ struct bench_station {
     double theta_i_deg, theta_r_deg, sample_mm;
     struct bench_mark marks[BENCH_AXES];
     int marks_count;
+    char arrive[BENCH_STEP], leave[BENCH_STEP]; // what a person does before the axes go there, and
+                                                // before they go elsewhere; "": nothing
     struct bench_place places[BENCH_DEVICES]; // of devices, while the axes stand there
     int places_count;
 };
@@ -141,6 +144,7 @@ struct bench_config {
     struct bench_station stations[BENCH_STATIONS];
     int stations_count;
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides
+    double step_limit_s;          // of a person's step, after which it is told again; 0: none
     struct {
         char argv[BENCH_NOTIFY][256]; // a program and its arguments
         int argc;                     // 0: nobody is told

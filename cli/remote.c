@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// status, stop, pause, resume: one question to the daemon each.
+// status, stop, pause, ack: one question to the daemon each.
 #include "cli/remote.h"
 
 #include "cli/client.h"
@@ -14,7 +14,7 @@
 struct options {
     struct remote_options remote;
     bool now; // of pause
-    const char *reason;
+    const char *reason; // or note
 };
 
 static const struct option_row rows[] = {
@@ -28,6 +28,14 @@ static const struct option_row pause_rows[] = {
      "at once: the reading in progress is given up"},
     {"--reason", OPTION_TEXT, offsetof(struct options, reason), "TEXT", 0, 0,
      "what for, for the others and the file"},
+    REMOTE_SOCKET(struct options),
+    REMOTE_JSON(struct options),
+    VERB_OPTIONS_END,
+};
+
+static const struct option_row ack_rows[] = {
+    {"--note", OPTION_TEXT, offsetof(struct options, reason), "TEXT", 0, 0,
+     "what there is to say about it, for the file"},
     REMOTE_SOCKET(struct options),
     REMOTE_JSON(struct options),
     VERB_OPTIONS_END,
@@ -198,6 +206,8 @@ static void print_run(const json_t *r)
     const char *text = text_of(r, "text");
     printf("run %d    %s (%s)%s%s\n", whole(r, "run"), text_of(r, "state"), text_of(r, "name"),
            *text ? ": " : "", text);
+    if (*text_of(r, "asks"))
+        printf("to do     %s; when that is done: gonio ack\n", text_of(r, "asks"));
     printf("progress  sweep %d of %d, %d of %d readings", whole(r, "sweep"), whole(r, "sweeps"),
            whole(r, "done"), whole(r, "total"));
     put_number(r, "left_s", ", ", 0, "s left");
@@ -341,3 +351,36 @@ const struct verb verb_pause = {
     "and reason stand in the campaign file.\n",
     pause_rows,
     run_pause};
+
+// --- ack -----------------------------------------------------------------------------------------
+
+static int run_ack(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    int status = EXIT_OK;
+    if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
+        return EXIT_INPUT;
+    json_t *body = json_pack("{s:s}", "note", o.reason ? o.reason : "");
+    if (!body) {
+        out_say("--note is no UTF-8");
+        return EXIT_INPUT;
+    }
+    json_t *reply = remote_call(&o.remote, "POST", "/api/v1/ack", body, &status);
+    json_decref(body);
+    if (reply && o.remote.json)
+        out_json(reply);
+    else if (reply)
+        fprintf(stderr, "run %d goes on\n", whole(reply, "run"));
+    json_decref(reply);
+    return status;
+}
+
+const struct verb verb_ack = {
+    "ack",
+    "",
+    "what the run waits for a person to do is done",
+    "A plan may wait for a person (insert the mirror, change the sample): gonio status says for what,\n"
+    "the laser is off meanwhile. This says that it is done; the run goes on, and the laser comes on.\n"
+    "Name, user and note stand in the campaign file.\n",
+    ack_rows,
+    run_ack};

@@ -26,7 +26,7 @@ struct verb {
 extern const struct verb verb_plan, verb_check;
 extern const struct verb verb_devices, verb_doctor;
 extern const struct verb verb_run, verb_watch;
-extern const struct verb verb_status, verb_stop, verb_pause, verb_resume;
+extern const struct verb verb_status, verb_stop, verb_pause, verb_resume, verb_ack;
 extern const struct verb verb_queue, verb_control;
 extern const struct verb verb_list, verb_show, verb_verify, verb_backup;
 extern const struct verb verb_fit, verb_model;

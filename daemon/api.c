@@ -266,6 +266,14 @@ static bool is_line(const char *text, size_t most)
     return strlen(text) <= most;
 }
 
+// An object; none is an empty one.
+static json_t *body_of(const struct call *c, json_error_t *e)
+{
+    return c->request->size
+               ? json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, e)
+               : json_object();
+}
+
 static struct http_reply post_pause(const struct call *c)
 {
     json_error_t e;
@@ -273,21 +281,39 @@ static struct http_reply post_pause(const struct call *c)
     char by[300];
     const char *reason = "";
     int now = 0;
-    json_t *body = c->request->size ? json_loadb(c->request->body, c->request->size,
-                                                 JSON_REJECT_DUPLICATES, &e)
-                                    : json_object();
-    if (!body ||
-        json_unpack_ex(body, &e, JSON_STRICT, "{s?b, s?s}", "now", &now, "reason", &reason) < 0 ||
-        !is_line(reason, MOST_REASON)) {
+    json_t *body = body_of(c, &e);
+    const bool right = body && json_unpack_ex(body, &e, JSON_STRICT, "{s?b, s?s}", "now", &now,
+                                              "reason", &reason) == 0;
+    if (!right || !is_line(reason, MOST_REASON)) {
         struct http_reply r =
-            fail(400, body && is_line(reason, MOST_REASON) ? e.text : "the reason is no short line",
-                 "the request's body",
+            fail(400, right ? "the reason is no short line" : e.text, "the request's body",
                  "send {\"now\": true|false, \"reason\": one line of at most 160 bytes}");
         json_decref(body);
         return r;
     }
     say_who(c, reason, by, sizeof by);
     const int run = hub_pause(c->hub, by, now, &err);
+    json_decref(body);
+    return told(c, run, &err);
+}
+
+static struct http_reply post_ack(const struct call *c)
+{
+    json_error_t e;
+    struct gon_error err;
+    char by[300];
+    const char *note = "";
+    json_t *body = body_of(c, &e);
+    const bool right = body && json_unpack_ex(body, &e, JSON_STRICT, "{s?s}", "note", &note) == 0;
+    if (!right || !is_line(note, MOST_REASON)) {
+        struct http_reply r = fail(400, right ? "the note is no short line" : e.text,
+                                   "the request's body",
+                                   "send {\"note\": one line of at most 160 bytes}");
+        json_decref(body);
+        return r;
+    }
+    say_who(c, note, by, sizeof by);
+    const int run = hub_ack(c->hub, by, &err);
     json_decref(body);
     return told(c, run, &err);
 }
@@ -395,6 +421,7 @@ static const struct route {
     {"POST", HTTP_STOP_PATH, post_stop, "POST", false},
     {"POST", "/api/v1/pause", post_pause, "POST", true},
     {"POST", "/api/v1/resume", post_resume, "POST", true},
+    {"POST", "/api/v1/ack", post_ack, "POST", true},
 };
 
 static const char *rest_of(const struct route *r, const char *path)

@@ -54,7 +54,7 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
                                     const char *text)
 {
     const struct plan_point *p = e->point;
-    return (struct engine_event){
+    struct engine_event event = {
         .kind = kind,
         .state = e->state,
         .sweep = p ? p->sweep : 0,
@@ -70,6 +70,8 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
         .wanted = e->wanted,
         .text = text,
     };
+    memcpy(event.asks, e->asks, sizeof event.asks);
+    return event;
 }
 
 void engine_say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt,
@@ -352,6 +354,11 @@ int engine_do_point(struct engine *e)
     int rc = engine_suspended(e);
     instrument_steady(e->in, false);
     if (rc >= 0)
+        rc = engine_operator_steps(e);
+    if (rc == ENGINE_AGAIN)
+        return rc;
+    e->heeding = true; // again, after a wait for somebody
+    if (rc >= 0)
         rc = prepare(e);
     if (rc >= 0)
         rc = instrument_watch_inputs(e->in, &e->why);
@@ -468,6 +475,7 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .config = config,
         .plan = plan,
         .state = RUN_QUEUED,
+        .stepped = -1,
         .acquire = {.range = -1},
         .omega_sr = bench_omega_sr(bench),
         .monitor_dark_v = (double)NAN,

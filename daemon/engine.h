@@ -25,6 +25,7 @@
 #include "daemon/safety.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct campaign_config;
@@ -61,6 +62,7 @@ struct engine_event {
     unsigned flags;  // of the stored reading
     double left_s;   // estimate; NAN unknown
     enum safety_light light;
+    char asks[160];   // what a person has to do before it goes on; "": nothing
     bool wanted;      // ENGINE_STATE, RUN_PAUSED: by the operator; nothing is wrong
     const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
@@ -97,6 +99,9 @@ struct engine_ports {
     bool (*take_resume)(void *ctx); // true once after an operator's "resume"; asked while paused
     // True once after an operator's "pause"; asked all the time. NULL: nobody pauses.
     bool (*take_pause)(void *ctx, struct engine_asked *ret_asked);
+    // True once after an operator's step was acknowledged, asked while one is waited for; ret_by as
+    // struct engine_asked's. NULL: nobody does.
+    bool (*take_ack)(void *ctx, char *ret_by, size_t size);
 };
 
 // Runs the plan from its first point without an accepted reading (the plan carries what is done).

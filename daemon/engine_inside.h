@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_suspend.c (suspenders
 // and interruptions), engine_reference.c (references after
-// a gap), engine_light.c (the laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
+// a gap), engine_steps.c (what a person does), engine_light.c (the laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
 // filter wheels and the like) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
@@ -29,6 +29,9 @@ struct engine {
     bool dark;   // laser off, read back at this campaign's own request; or the shutter closed that
                  // makes the darks
     bool wanted; // the pause is the operator's
+    char asks[160];           // of whoever is there; "": nothing
+    char station[BENCH_NAME]; // where the bench was made ready for; "": the sample
+    int stepped;              // the point before which a sweep's step was done; -1: none
     bool asking; // somebody asked for a pause, as asked says
     struct engine_asked asked;
     bool heeding;              // waits may be interrupted: a point is in progress
@@ -72,6 +75,10 @@ void engine_count_attempts(struct engine *e); // of the opening points, at the b
 void engine_keep_attempt(struct engine *e);   // of the point that is done
 // The opening references again, where there was a gap and the sample is next.
 int engine_refer(struct engine *e);
+
+// --- engine_steps.c ---
+// What a person has to do before this point, one after the other. ENGINE_AGAIN: there was a pause.
+int engine_operator_steps(struct engine *e);
 
 // --- engine_pause.c ---
 int engine_canceled(struct engine *e);                 // GON_E_CANCELED

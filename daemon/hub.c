@@ -384,6 +384,16 @@ int hub_pause(struct hub *h, const char *by, bool now, struct gon_error *err)
     return rc;
 }
 
+int hub_ack(struct hub *h, const char *by, struct gon_error *err)
+{
+    const struct run *run = queue_active(h->queue);
+    if (!run || !*run->asks)
+        return gon_fail(err, GON_E_REFUSED, "nothing waits for a person; see: gonio status");
+    struct note *n = note_new(NOTE_ACK);
+    n->text = note_text(by);
+    return to_active(h, n, 1u << RUN_PAUSED, err);
+}
+
 int hub_resume(struct hub *h, struct gon_error *err)
 {
     struct queue_entry first;
@@ -391,6 +401,10 @@ int hub_resume(struct hub *h, struct gon_error *err)
         queue_hold(h->queue, 0, false, NULL);
         return first.run->id;
     }
+    const struct run *run = queue_active(h->queue);
+    if (run && *run->asks)
+        return gon_fail(err, GON_E_REFUSED, "run %d waits for a person: %s; when that is done: gonio ack",
+                        run->id, run->asks);
     return to_active(h, note_new(NOTE_RESUME), 1u << RUN_PAUSED, err);
 }
 

@@ -35,7 +35,8 @@ struct runner {
     struct gon_error answer; // to that one
     bool reading_open;       // the last reading was posted and not yet acknowledged
     struct store_reading reading;
-    bool pause, resume, halt, quit;
+    bool pause, resume, ack, halt, quit;
+    char acked_by[300];
     struct engine_asked asked; // of that pause
     struct note *start;       // the next run, held until the thread is idle
     int64_t next_snapshot_ns; // not before every part was asked once
@@ -52,6 +53,10 @@ static void take(struct runner *r, struct note *n)
         r->asked.now = (r->pause && r->asked.now) || n->last;
         snprintf(r->asked.by, sizeof r->asked.by, "%s", n->text ? n->text : "");
         r->pause = true;
+        break;
+    case NOTE_ACK:
+        r->ack = true;
+        snprintf(r->acked_by, sizeof r->acked_by, "%s", n->text ? n->text : "");
         break;
     case NOTE_RESUME: r->resume = true; break;
     case NOTE_HALT: r->halt = true; break;
@@ -208,6 +213,15 @@ static bool take_pause_port(void *ctx, struct engine_asked *ret_asked)
     return true;
 }
 
+static bool take_ack_port(void *ctx, char *ret_by, size_t size)
+{
+    struct runner *r = ctx;
+    if (!take_flag(r, &r->ack))
+        return false;
+    snprintf(ret_by, size, "%s", r->acked_by);
+    return true;
+}
+
 // --- the disk ------------------------------------------------------------------------------------
 
 static double free_mb(void *ctx)
@@ -226,7 +240,7 @@ static void run(struct runner *r)
     struct run_material *m = start->thing;
     r->start = NULL;
     r->run = start->run;
-    r->pause = r->resume = r->reading_open = false;
+    r->pause = r->resume = r->ack = r->reading_open = false;
     struct engine_ports ports = {
         .ctx = r,
         .clk = clk_system(),
@@ -238,6 +252,7 @@ static void run(struct runner *r)
         .request_fit = request_fit_port,
         .take_resume = take_resume_port,
         .take_pause = take_pause_port,
+        .take_ack = take_ack_port,
     };
     n->run = r->run;
     n->state = engine_run(&ports, r->in, &m->config, &m->plan, &n->err);

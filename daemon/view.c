@@ -21,6 +21,7 @@ json_t *view_run(const struct run *run, bool with_fit)
                           run_state_name(run->state), "text", run->text, "sweep", run->sweep,
                           "sweeps", run->sweeps, "done", run->done, "total", run->total, "emission",
                           run->light == SAFETY_LIGHT_MAYBE);
+    json_object_set_new(o, "asks", *run->asks ? json_string(run->asks) : json_null());
     json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
     json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
     json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));

@@ -10,7 +10,7 @@
 
 json_t *view_number(double value); // null unless finite
 
-// {"run", "name", "sample", "file", "state", "text", "sweep", "sweeps", "done", "total",
+// {"run", "name", "sample", "file", "state", "text", "asks", "sweep", "sweeps", "done", "total",
 //  "theta_i_deg", "theta_r_deg", "f_r_per_sr", "u_f_r_per_sr", "flags", "left_s", "emission"};
 // with_fit adds "fit".
 json_t *view_run(const struct run *run, bool with_fit);

@@ -23,7 +23,7 @@ def test_help_names_every_verb():
     r = gonio("help")
     assert r.returncode == 0 and r.stderr == ""
     verbs = [line.split()[0] for line in r.stdout.splitlines() if line.startswith("  ")]
-    assert verbs == ["plan", "run", "watch", "status", "devices", "stop", "pause", "resume", "queue", "control", "list",
+    assert verbs == ["plan", "run", "watch", "status", "devices", "stop", "pause", "resume", "ack", "queue", "control", "list",
                      "show", "verify", "backup", "fit", "model", "check", "doctor", "profile"]
     for verb in verbs:
         r = gonio("help", verb)

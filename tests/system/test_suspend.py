@@ -114,7 +114,7 @@ def test_a_door_waits_for_somebody_and_warmth_for_nobody(bench, daemon):
     time.sleep(1.5)
     assert daemon.status()["state"] == "paused" and not bench.emits()
     assert daemon.request("POST", "/api/v1/resume")[0] == 202
-    events.until_state(run, "running")
+    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1, 60.0)
 
     bench.set(bench_c=25.1)
     paused = events.until_state(run, "paused")
