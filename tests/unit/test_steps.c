@@ -12,6 +12,7 @@
 #define OUT "take the sample out"
 #define IN "put the sample in"
 #define TURN "turn the sample"
+#define START "clean the mirror"
 
 static char asked[20][200]; // in order
 static int asked_count;
@@ -70,6 +71,7 @@ static struct run *begin_stepped(void)
     struct run *r = begin_on(&spec, &bench);
     small_plan(r);
     r->config.steps[r->config.steps_count++] = (struct campaign_step){2, TURN};
+    r->config.steps[r->config.steps_count++] = (struct campaign_step){0, START};
     r->ports.store_event = keep_event;
     r->ports.take_ack = acknowledge;
     r->on_pause = note_asked;
@@ -100,10 +102,10 @@ static void a_run_waits_for_each_and_is_dark_meanwhile(void **state)
     struct run *r = begin_stepped();
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_asked((const char *const[]){OUT, IN, TURN, OUT, IN, NULL}); // the last dark is at "park"
+    assert_asked((const char *const[]){START, OUT, IN, TURN, OUT, IN, NULL}); // the last dark is at "park"
     assert_false(lit_meanwhile);
-    assert_int_equal(said_count, 5);
-    assert_string_equal(said[2], "running: acknowledged by the operator anna (uid 1000): done (" TURN ")");
+    assert_int_equal(said_count, 6);
+    assert_string_equal(said[3], "running: acknowledged by the operator anna (uid 1000): done (" TURN ")");
     for (int i = 0; i < r->plan.count; i++) // no gap: nothing again
         assert_int_equal(accepted_of(r, &r->points[i]), 1);
     end(r);
@@ -116,9 +118,9 @@ static void the_plan_has_them_in_the_same_order(void **state)
     struct plan *p = &r->plan;
     assert_int_equal(plan_add_steps(&r->config, &r->bench, p, NULL), 0);
     static const struct plan_step steps[] = {
-        {1, 0, OUT}, {2, 1, IN}, {7, 2, TURN}, {12, 3, OUT}, {13, 3, IN}};
-    assert_int_equal(p->steps_count, 5);
-    for (int i = 0; i < 5; i++) {
+        {0, 0, START}, {1, 0, OUT}, {2, 1, IN}, {7, 2, TURN}, {12, 3, OUT}, {13, 3, IN}};
+    assert_int_equal(p->steps_count, 6);
+    for (int i = 0; i < 6; i++) {
         assert_int_equal(p->steps[i].before, steps[i].before);
         assert_int_equal(p->steps[i].sweep, steps[i].sweep);
         assert_string_equal(p->steps[i].text, steps[i].text);
@@ -135,7 +137,7 @@ static void one_that_nobody_acknowledges_is_told_once_more_and_stays(void **stat
     r->cancel_at_ns = CLK_S(5000);
     assert_int_equal(go(r), RUN_STOPPED);
     assert_int_equal(r->pauses_count, 2);
-    assert_string_equal(r->pauses[1], "operator: " OUT
+    assert_string_equal(r->pauses[1], "operator: " START
                                       ", then: gonio ack (not acknowledged for 600 s)");
     assert_false(lit_meanwhile);
     assert_int_equal(r->b.ons, 0);
@@ -145,7 +147,7 @@ static void one_that_nobody_acknowledges_is_told_once_more_and_stays(void **stat
 static void pause_at_turn(struct run *r)
 {
     note_asked(r);
-    if (asked_count == 3 && said_count == 2 && !r->want_pause && r->pauses_count == 3)
+    if (asked_count == 4 && said_count == 3 && !r->want_pause && r->pauses_count == 4)
         r->want_pause = true;
     else if (strstr(r->pauses[r->pauses_count - 1], "by the operator"))
         r->want_resume = true;
@@ -160,9 +162,9 @@ static void it_is_asked_again_after_a_pause(void **state)
     r->on_time = NULL;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_string_equal(asked[2], asked[3]);
-    assert_int_equal(asked_count, 6);
-    assert_int_equal(said_count, 5);
+    assert_string_equal(asked[3], asked[4]);
+    assert_int_equal(asked_count, 7);
+    assert_int_equal(said_count, 6);
     end(r);
 }
 
@@ -181,7 +183,7 @@ static void a_gap_asks_for_what_its_references_need(void **state)
     r->on_row = unplug_at_row;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_asked((const char *const[]){OUT, IN, OUT, IN, TURN, OUT, IN, NULL});
+    assert_asked((const char *const[]){START, OUT, IN, OUT, IN, TURN, OUT, IN, NULL});
     end(r);
 }
 
