@@ -47,8 +47,8 @@ const struct cfg_row bench_suspender_rows[] = {
 // --- reading a condition -------------------------------------------------------------------------
 
 static const char *const signs[] = {"=", "!=", "<=", "<", ">=", ">"};
-static const enum bench_sign sign_of[] = {BENCH_EQUAL,      BENCH_UNEQUAL,    BENCH_LESS_EQUAL,
-                                          BENCH_LESS,       BENCH_MORE_EQUAL, BENCH_MORE};
+static const enum bench_sign sign_of[] = {BENCH_EQUAL, BENCH_UNEQUAL,    BENCH_LESS_EQUAL,
+                                          BENCH_LESS,  BENCH_MORE_EQUAL, BENCH_MORE};
 enum { SIGNS = sizeof sign_of / sizeof *sign_of };
 
 static void skip_spaces(const char **at)

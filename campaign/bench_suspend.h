@@ -70,6 +70,6 @@ bool bench_term_is(const struct bench_term *t, const char *own_value);
 // Only the light tells it: monitor_v, laser_power_w.
 bool bench_term_needs_light(const struct bench_term *t);
 
-// Checks across settings: reports each mistake with its line. Returns how many. What values a device
-// has only its profile says: gonio check looks there.
+// Checks across settings: reports each mistake with its line. Returns how many. What values a
+// device has only its profile says: gonio check looks there.
 int bench_suspend_check(struct cfg_file *f, const struct bench_config *b);

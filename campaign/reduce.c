@@ -174,8 +174,8 @@ static int add_beam(struct references *f, const struct plan_point *p, const stru
     b->out = p->pol_out;
     b->ratio.interpolated = f->again;
     return rc < 0 ? rc
-                  : reduce_series_add(&b->ratio, r->t_utc_ms,
-                                      (r->signal_v - dark_signal) / monitor, err);
+                  : reduce_series_add(&b->ratio, r->t_utc_ms, (r->signal_v - dark_signal) / monitor,
+                                      err);
 }
 
 static bool was_measured_again(const struct plan *plan, const struct store_reading *rows, int count)
@@ -280,8 +280,7 @@ static bool reduce_point(const struct reduction *r, const struct references *f,
     const double dark_monitor_v = reduce_series_at(&f->dark_monitor, t_ms);
     const double beam_ratio =
         channel->beam_ratio * (reduce_series_at(ratio, t_ms) / reduce_series_mean(ratio));
-    const double monitor =
-        isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(dark_monitor_v);
+    const double monitor = isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(dark_monitor_v);
     const double scale = 1 / (beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
     if (!(cosine(r, p) > 1e-6) || !(monitor > 0))
         return false;
@@ -366,7 +365,8 @@ static int add_channel(struct reduction *r, const struct references *f,
     int rc = check_beam(r, beam, p->pol_in, err);
     if (rc < 0)
         return rc;
-    const double ratio = reduce_series_mean(&beam->ratio), signal_v = r->reference.beam_signal_v[p->pol_in];
+    const double ratio = reduce_series_mean(&beam->ratio),
+                 signal_v = r->reference.beam_signal_v[p->pol_in];
     const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
     const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
     *c = (struct reduce_channel){.pol_in = p->pol_in, .pol_out = p->pol_out};

@@ -50,8 +50,7 @@ double reduce_series_at(const struct reduce_series *s, int64_t t_utc_ms)
     if (i == 0 || i == s->count)
         return s->value[i ? i - 1 : 0].value;
     const struct reduce_value *a = &s->value[i - 1], *b = &s->value[i];
-    const double part =
-        (double)(t_utc_ms - a->t_utc_ms) / (double)(b->t_utc_ms - a->t_utc_ms);
+    const double part = (double)(t_utc_ms - a->t_utc_ms) / (double)(b->t_utc_ms - a->t_utc_ms);
     return a->value + part * (b->value - a->value);
 }
 

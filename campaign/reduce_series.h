@@ -12,7 +12,7 @@ struct reduce_value {
     double value;
 };
 
-struct reduce_series { // zeroed: empty
+struct reduce_series {          // zeroed: empty
     struct reduce_value *value; // by time
     int count;
     bool interpolated; // else one mean for all of the time
@@ -22,7 +22,7 @@ int reduce_series_add(struct reduce_series *s, int64_t t_utc_ms, double value,
                       struct gon_error *err); // GON_E_SYSTEM
 void reduce_series_clear(struct reduce_series *s);
 
-double reduce_series_mean(const struct reduce_series *s); // NAN when empty
+double reduce_series_mean(const struct reduce_series *s);  // NAN when empty
 double reduce_series_least(const struct reduce_series *s); // NAN when empty
 // Linear in time between neighbours, before the first and after the last as that one.
 double reduce_series_at(const struct reduce_series *s, int64_t t_utc_ms);

@@ -81,7 +81,8 @@ static void check_values(struct checked *c, const struct profile *p, int index)
         const char *value;
         bench_condition_parse(c->bench->suspenders[i].when, &when, NULL);
         for (int k = 0; k < when.terms; k++)
-            if (bench_term_device(c->bench, &when.term[k], &value) == index && profile_value(p, value) < 0)
+            if (bench_term_device(c->bench, &when.term[k], &value) == index &&
+                profile_value(p, value) < 0)
                 complain(c, when.term[k].name,
                          "suspenders[%d].when = \"%s\": profile %s has no value '%s'", i,
                          c->bench->suspenders[i].when, p->name, value);

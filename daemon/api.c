@@ -119,8 +119,7 @@ static struct http_reply get_status(const struct call *c)
     json_object_set_new(o, "control", view_control(hub_control(c->hub)));
     json_object_set_new(o, "queue_held", json_boolean(queue_is_held(q)));
     json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
-    json_object_set_new(o, "suspenders",
-                        s.snapshot ? view_suspenders(s.snapshot) : json_array());
+    json_object_set_new(o, "suspenders", s.snapshot ? view_suspenders(s.snapshot) : json_array());
     json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
     return reply(200, view_text(o));
 }
@@ -306,9 +305,9 @@ static struct http_reply post_ack(const struct call *c)
     json_t *body = body_of(c, &e);
     const bool right = body && json_unpack_ex(body, &e, JSON_STRICT, "{s?s}", "note", &note) == 0;
     if (!right || !is_line(note, MOST_REASON)) {
-        struct http_reply r = fail(400, right ? "the note is no short line" : e.text,
-                                   "the request's body",
-                                   "send {\"note\": one line of at most 160 bytes}");
+        struct http_reply r =
+            fail(400, right ? "the note is no short line" : e.text, "the request's body",
+                 "send {\"note\": one line of at most 160 bytes}");
         json_decref(body);
         return r;
     }

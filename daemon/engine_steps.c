@@ -26,8 +26,8 @@ static void say(struct engine *e, double late_s)
     engine_enter_pause(e, text);
 }
 
-// Acknowledged: 0. A pause that somebody asks for meanwhile is one of its own, and the step is still
-// to be done: ENGINE_AGAIN.
+// Acknowledged: 0. A pause that somebody asks for meanwhile is one of its own, and the step is
+// still to be done: ENGINE_AGAIN.
 static int wait_for_it(struct engine *e, char *ret_by, size_t size)
 {
     const int64_t start_ns = clk_now_ns(e->ports->clk);
@@ -83,8 +83,8 @@ int engine_operator_steps(struct engine *e)
     const char *text;
     for (;;) {
         const bool begun = e->referring || e->stepped == index;
-        const enum plan_step_kind kind = plan_next_step(
-            e->config, instrument_bench(e->in), e->plan, index, e->station, begun, &text);
+        const enum plan_step_kind kind = plan_next_step(e->config, instrument_bench(e->in), e->plan,
+                                                        index, e->station, begun, &text);
         if (kind == PLAN_STEP_NONE)
             break;
         int rc = ask(e, text);

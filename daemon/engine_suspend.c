@@ -57,8 +57,8 @@ static void say_why(struct engine *e, const struct suspender_state *s)
     char text[500], quiet[80] = "";
     if (s->left_s > 0)
         snprintf(quiet, sizeof quiet, " once that has been quiet for %.3g s", s->settle_s);
-    snprintf(text, sizeof text, "suspended by \"%s\": %s%s; %s%s%s", s->name,
-             s->text, s->holds || s->needs_light ? "" : " until a moment ago",
+    snprintf(text, sizeof text, "suspended by \"%s\": %s%s; %s%s%s", s->name, s->text,
+             s->holds || s->needs_light ? "" : " until a moment ago",
              s->manual && s->holds ? "mend it, then: gonio resume; it goes on"
              : s->manual           ? "go on with: gonio resume"
                                    : "it goes on by itself",

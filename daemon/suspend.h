@@ -15,15 +15,15 @@ struct bench_config;
 
 // For whoever shows them.
 struct suspender_state {
-    const char *name;  // NULL: none
-    bool manual;       // waits for a release
-    bool holds;        // now
-    bool keeps;        // the run from going on
-    bool waits;        // quiet, but not released yet
-    bool needs_light;  // nobody sees without light whether it holds
-    double settle_s;   // for so long it has to be quiet
-    double left_s;     // of that; 0: quiet for long enough. While it holds all of it
-    char text[160];    // what it said when it held last; "" never
+    const char *name; // NULL: none
+    bool manual;      // waits for a release
+    bool holds;       // now
+    bool keeps;       // the run from going on
+    bool waits;       // quiet, but not released yet
+    bool needs_light; // nobody sees without light whether it holds
+    double settle_s;  // for so long it has to be quiet
+    double left_s;    // of that; 0: quiet for long enough. While it holds all of it
+    char text[160];   // what it said when it held last; "" never
 };
 
 struct suspend_source {

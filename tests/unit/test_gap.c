@@ -14,9 +14,9 @@
 #define GAP_S 1000.0
 #define AFTERWARDS 0.8 // of the detector's sensitivity, after the gap
 
-static int pause_row;       // pauses after that many rows
-static int64_t resume_ns;   // and is resumed then
-static char said[20][400];  // events about references
+static int pause_row;      // pauses after that many rows
+static int64_t resume_ns;  // and is resumed then
+static char said[20][400]; // events about references
 static int said_count;
 
 static int keep_event(void *ctx, const char *level, const char *source, const char *text,
@@ -109,11 +109,12 @@ static void dark_and_beam_are_measured_again_before_the_sample(void **state)
     assert_int_equal(said_count, 1);
     double gap_s, dark_v, change;
     print_message("%s\n", said[0]);
-    assert_int_equal(sscanf(said[0],
-                            "references measured again after a gap of %lf s: dark %lf V, beam (%*[a-z]) "
-                            "%lf %%",
-                            &gap_s, &dark_v, &change),
-                     3);
+    assert_int_equal(
+        sscanf(said[0],
+               "references measured again after a gap of %lf s: dark %lf V, beam (%*[a-z]) "
+               "%lf %%",
+               &gap_s, &dark_v, &change),
+        3);
     assert_true(gap_s > GAP_S - 2 && gap_s < GAP_S + 60);
     assert_true(fabs(change - 100 * (AFTERWARDS - 1)) < 0.1);
     for (int k = 0; k < r->plan.count; k++) // what was published meanwhile

@@ -17,7 +17,7 @@
 static char asked[20][200]; // in order
 static int asked_count;
 static int64_t asked_ns;
-static double patience_s;   // of the person
+static double patience_s; // of the person
 static bool lit_meanwhile;
 static char said[40][400];
 static int said_count;
@@ -102,10 +102,12 @@ static void a_run_waits_for_each_and_is_dark_meanwhile(void **state)
     struct run *r = begin_stepped();
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_asked((const char *const[]){START, OUT, IN, TURN, OUT, IN, NULL}); // the last dark is at "park"
+    assert_asked(
+        (const char *const[]){START, OUT, IN, TURN, OUT, IN, NULL}); // the last dark is at "park"
     assert_false(lit_meanwhile);
     assert_int_equal(said_count, 6);
-    assert_string_equal(said[3], "running: acknowledged by the operator anna (uid 1000): done (" TURN ")");
+    assert_string_equal(said[3],
+                        "running: acknowledged by the operator anna (uid 1000): done (" TURN ")");
     for (int i = 0; i < r->plan.count; i++) // no gap: nothing again
         assert_int_equal(accepted_of(r, &r->points[i]), 1);
     end(r);
@@ -117,8 +119,8 @@ static void the_plan_has_them_in_the_same_order(void **state)
     struct run *r = begin_stepped();
     struct plan *p = &r->plan;
     assert_int_equal(plan_add_steps(&r->config, &r->bench, p, NULL), 0);
-    static const struct plan_step steps[] = {
-        {0, 0, START}, {1, 0, OUT}, {2, 1, IN}, {7, 2, TURN}, {12, 3, OUT}, {13, 3, IN}};
+    static const struct plan_step steps[] = {{0, 0, START}, {1, 0, OUT},  {2, 1, IN},
+                                             {7, 2, TURN},  {12, 3, OUT}, {13, 3, IN}};
     assert_int_equal(p->steps_count, 6);
     for (int i = 0; i < 6; i++) {
         assert_int_equal(p->steps[i].before, steps[i].before);
@@ -137,8 +139,8 @@ static void one_that_nobody_acknowledges_is_told_once_more_and_stays(void **stat
     r->cancel_at_ns = CLK_S(5000);
     assert_int_equal(go(r), RUN_STOPPED);
     assert_int_equal(r->pauses_count, 2);
-    assert_string_equal(r->pauses[1], "operator: " START
-                                      ", then: gonio ack (not acknowledged for 600 s)");
+    assert_string_equal(r->pauses[1],
+                        "operator: " START ", then: gonio ack (not acknowledged for 600 s)");
     assert_false(lit_meanwhile);
     assert_int_equal(r->b.ons, 0);
     end(r);

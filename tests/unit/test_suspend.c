@@ -27,10 +27,9 @@ static void conditions_are_read(void **state)
 {
     (void)state;
     struct bench_condition c;
-    assert_int_equal(
-        bench_condition_parse(" door.open and not room.ok and room.t_c>=-2.5 and a.b != 1e3", &c,
-                              NULL),
-        0);
+    assert_int_equal(bench_condition_parse(
+                         " door.open and not room.ok and room.t_c>=-2.5 and a.b != 1e3", &c, NULL),
+                     0);
     assert_int_equal(c.terms, 4);
     assert_string_equal(c.term[0].name, "door.open");
     assert_true(c.term[0].sign == BENCH_SET && c.term[1].sign == BENCH_NOT_SET);
@@ -62,8 +61,8 @@ static void terms_hold_at_their_limits_and_when_nothing_is_known(void **state)
         const char *when;
         bool below, at, above; // of 2
     } table[] = {
-        {"x = 2", false, true, false},  {"x != 2", true, false, true}, {"x < 2", true, false, false},
-        {"x <= 2", true, true, false},  {"x > 2", false, false, true}, {"x >= 2", false, true, true},
+        {"x = 2", false, true, false}, {"x != 2", true, false, true}, {"x < 2", true, false, false},
+        {"x <= 2", true, true, false}, {"x > 2", false, false, true}, {"x >= 2", false, true, true},
     };
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         assert_int_equal(holds_at(table[i].when, 1.9), table[i].below);
@@ -316,7 +315,8 @@ static void an_interlock_never_resumes_by_itself(void **state)
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
     assert_int_equal(r->pauses_count, 1);
-    assert_non_null(strstr(r->pauses[0], "suspended by \"interlock\": interlock_open = 1; mend it"));
+    assert_non_null(
+        strstr(r->pauses[0], "suspended by \"interlock\": interlock_open = 1; mend it"));
     assert_true(length_s(r) > 1000);
     end(r);
 }
@@ -429,8 +429,8 @@ static void pause_at(int64_t t_ns, bool now, int *ret_rows, double *ret_s)
     assert_string_equal(r->pauses[0],
                         "by the operator anna (uid 1000): lunch; go on with: gonio resume");
     int rows = 0;
-    while (rows < r->rows && r->row[rows].t_utc_ms * 1000000 < clk_utc_ns(&r->b.clk.clk) -
-                                                                   r->b.clk.t_ns + scene.dark_ns)
+    while (rows < r->rows && r->row[rows].t_utc_ms * 1000000 <
+                                 clk_utc_ns(&r->b.clk.clk) - r->b.clk.t_ns + scene.dark_ns)
         rows++;
     *ret_rows = rows - scene.ons;
     *ret_s = (double)(scene.dark_ns - t_ns) * 1e-9;
