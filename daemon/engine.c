@@ -344,7 +344,7 @@ static int measure(struct engine *e, const struct travel_pose *at)
 int engine_do_point(struct engine *e)
 {
     struct travel_pose at;
-    e->interrupt = (struct gon_error){GON_OK};
+    e->interrupt = (struct gon_error){.code = GON_OK};
     e->suspended = false;
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
