@@ -3,7 +3,7 @@
 
 #include "base/units.h"
 #include "campaign/reduce_elements.h"
-#include "campaign/reduce_series.h"
+#include "campaign/reduce_references.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -125,142 +125,9 @@ static double sample_u_v(const struct reduce_noise *n, double signal_v)
     return hypot(n->floor_v, n->rel * signal_v);
 }
 
-// --- references ----------------------------------------------------------------------------------
-
 static double without_nan(double value)
 {
     return isnan(value) ? 0 : value;
-}
-
-struct beam {
-    struct reduce_series signal, monitor, ratio;
-    int samples, out; // out: what stood before the detector
-};
-
-struct references {
-    struct reduce_series dark_signal, dark_monitor;
-    int dark_samples;
-    struct beam beam[POL_COUNT]; // by the light's state
-    bool again;                  // one was measured again, after a gap
-};
-
-// The next accepted reading of the point; NULL: no more.
-static const struct store_reading *next_of(const struct plan_point *p,
-                                           const struct store_reading *rows, int count, int *at)
-{
-    for (; *at < count && rows[*at].sweep == p->sweep && rows[*at].point == p->point; (*at)++)
-        if (accepted(&rows[*at]))
-            return &rows[(*at)++];
-    return NULL;
-}
-
-static int add_dark(struct references *f, const struct store_reading *r, struct gon_error *err)
-{
-    int rc = reduce_series_add(&f->dark_signal, r->t_utc_ms, r->signal_v, err);
-    f->dark_samples += r->count;
-    return rc < 0 ? rc : reduce_series_add(&f->dark_monitor, r->t_utc_ms, r->monitor_v, err);
-}
-
-static int add_beam(struct references *f, const struct plan_point *p, const struct store_reading *r,
-                    struct gon_error *err)
-{
-    struct beam *b = &f->beam[p->pol_in];
-    const double dark_signal = reduce_series_at(&f->dark_signal, r->t_utc_ms);
-    const double dark_monitor = reduce_series_at(&f->dark_monitor, r->t_utc_ms);
-    const double monitor = isnan(r->monitor_v) ? 1 : r->monitor_v - without_nan(dark_monitor);
-    int rc = reduce_series_add(&b->signal, r->t_utc_ms, r->signal_v, err);
-    rc = rc < 0 ? rc : reduce_series_add(&b->monitor, r->t_utc_ms, r->monitor_v, err);
-    b->samples += r->count;
-    b->out = p->pol_out;
-    b->ratio.interpolated = f->again;
-    return rc < 0 ? rc
-                  : reduce_series_add(&b->ratio, r->t_utc_ms, (r->signal_v - dark_signal) / monitor,
-                                      err);
-}
-
-static bool was_measured_again(const struct plan *plan, const struct store_reading *rows, int count)
-{
-    for (int i = 0, at = 0; i < plan->count; i++) {
-        int good = 0;
-        while (next_of(&plan->points[i], rows, count, &at))
-            good++;
-        if (plan->points[i].kind != PLAN_SAMPLE && good > 1)
-            return true;
-    }
-    return false;
-}
-
-static int add_references(struct references *f, enum plan_kind kind, const struct plan *plan,
-                          const struct store_reading *rows, int count, struct gon_error *err)
-{
-    const struct store_reading *r;
-    int rc = GON_OK;
-    for (int i = 0, at = 0; i < plan->count && rc >= 0; i++) {
-        const struct plan_point *p = &plan->points[i];
-        while (rc >= 0 && (r = next_of(p, rows, count, &at)))
-            rc = p->kind != kind     ? GON_OK
-                 : kind == PLAN_DARK ? add_dark(f, r, err)
-                                     : add_beam(f, p, r, err);
-    }
-    return rc;
-}
-
-// The darks first: the beams are over them.
-static int collect(struct references *f, const struct plan *plan, const struct store_reading *rows,
-                   int count, struct gon_error *err)
-{
-    f->again = was_measured_again(plan, rows, count);
-    f->dark_signal.interpolated = f->dark_monitor.interpolated = f->again;
-    int rc = add_references(f, PLAN_DARK, plan, rows, count, err);
-    return rc < 0 ? rc : add_references(f, PLAN_BEAM, plan, rows, count, err);
-}
-
-static void clear_references(struct references *f)
-{
-    reduce_series_clear(&f->dark_signal);
-    reduce_series_clear(&f->dark_monitor);
-    for (int i = 0; i < POL_COUNT; i++) {
-        reduce_series_clear(&f->beam[i].signal);
-        reduce_series_clear(&f->beam[i].monitor);
-        reduce_series_clear(&f->beam[i].ratio);
-    }
-}
-
-// Of those that a value rests on: all of a mean, one group of them when they are interpolated.
-static double samples_of(const struct reduce_series *s, int samples)
-{
-    return s->interpolated && s->count ? (double)samples / s->count : samples;
-}
-
-static struct reduce_reference means(const struct references *f)
-{
-    struct reduce_reference r = {
-        reduce_series_mean(&f->dark_signal), reduce_series_mean(&f->dark_monitor), {0}, {0}};
-    for (int i = 0; i < POL_COUNT; i++) {
-        r.beam_signal_v[i] = reduce_series_mean(&f->beam[i].signal);
-        r.beam_monitor_v[i] = reduce_series_mean(&f->beam[i].monitor);
-    }
-    return r;
-}
-
-struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
-                                       int count)
-{
-    struct reduce_reference o = {(double)NAN, (double)NAN, {0}, {0}};
-    for (int i = 0; i < POL_COUNT; i++)
-        o.beam_signal_v[i] = o.beam_monitor_v[i] = (double)NAN;
-    for (int i = 0, at = 0; i < plan->count && plan->points[i].sweep == 0; i++) {
-        const struct plan_point *p = &plan->points[i];
-        const struct store_reading *r = reading_of(p, rows, count, &at);
-        if (r && p->kind == PLAN_DARK) {
-            o.dark_signal_v = r->signal_v;
-            o.dark_monitor_v = r->monitor_v;
-        } else if (r && p->kind == PLAN_BEAM) {
-            o.beam_signal_v[p->pol_in] = r->signal_v;
-            o.beam_monitor_v[p->pol_in] = r->monitor_v;
-        }
-    }
-    return o;
 }
 
 // --- points --------------------------------------------------------------------------------------
@@ -271,7 +138,7 @@ static double cosine(const struct reduction *r, const struct reduced_point *p)
 }
 
 // False when this point has no value: at or below the horizon, or with the light gone.
-static bool reduce_point(const struct reduction *r, const struct references *f,
+static bool reduce_point(const struct reduction *r, const struct reduce_references *f,
                          const struct store_reading *row, const struct reduce_channel *channel,
                          struct reduced_point *p)
 {
@@ -292,7 +159,7 @@ static bool reduce_point(const struct reduction *r, const struct references *f,
     return isfinite(p->f_per_sr);
 }
 
-static int reduce_points(struct reduction *r, const struct references *f, const struct plan *plan,
+static int reduce_points(struct reduction *r, const struct reduce_references *f, const struct plan *plan,
                          const struct store_reading *rows, int count, struct gon_error *err)
 {
     r->points = calloc((size_t)plan->samples + 1, sizeof *r->points);
@@ -323,22 +190,22 @@ static int reduce_points(struct reduction *r, const struct references *f, const 
 
 // --- all of it -----------------------------------------------------------------------------------
 
-static int reduce_dark(struct reduction *r, const struct references *f, struct gon_error *err)
+static int reduce_dark(struct reduction *r, const struct reduce_references *f, struct gon_error *err)
 {
     r->darks = f->dark_signal.count;
     for (int i = 0; i < POL_COUNT; i++)
         r->beams += f->beam[i].signal.count;
-    r->reference = means(f);
+    r->reference = reduce_reference_means(f);
     r->u_dark_v =
         hypot(reduce_series_u(&f->dark_signal),
-              without_nan(r->noise.floor_v) / sqrt(samples_of(&f->dark_signal, f->dark_samples)));
+              without_nan(r->noise.floor_v) / sqrt(reduce_series_samples(&f->dark_signal, f->dark_samples)));
     if (!r->darks || !r->beams)
         return gon_fail(err, GON_E_INPUT, "no %s reading yet: without it there is no absolute BRDF",
                         r->darks ? "beam" : "dark");
     return GON_OK;
 }
 
-static int check_beam(const struct reduction *r, const struct beam *beam, int pol_in,
+static int check_beam(const struct reduction *r, const struct reduce_beam *beam, int pol_in,
                       struct gon_error *err)
 {
     const double ratio = reduce_series_mean(&beam->ratio);
@@ -356,11 +223,11 @@ static int check_beam(const struct reduction *r, const struct beam *beam, int po
                     r->reference.dark_signal_v, r->reference.dark_monitor_v);
 }
 
-static int add_channel(struct reduction *r, const struct references *f,
+static int add_channel(struct reduction *r, const struct reduce_references *f,
                        const struct bench_config *bench, const struct plan_point *p,
                        struct gon_error *err)
 {
-    const struct beam *beam = &f->beam[p->pol_in];
+    const struct reduce_beam *beam = &f->beam[p->pol_in];
     struct reduce_channel *c = &r->channel[r->channels];
     int rc = check_beam(r, beam, p->pol_in, err);
     if (rc < 0)
@@ -375,7 +242,7 @@ static int add_channel(struct reduction *r, const struct references *f,
     c->beam_ratio /= bench_beam_passes(bench, &c->u_filter_rel);
     c->u_beam_rel =
         hypot(reduce_series_u(&beam->ratio) / ratio,
-              hypot(noise, r->noise.rel_monitor) / sqrt(samples_of(&beam->ratio, beam->samples)));
+              hypot(noise, r->noise.rel_monitor) / sqrt(reduce_series_samples(&beam->ratio, beam->samples)));
     c->u_scale_rel = hypot(hypot(c->u_beam_rel, hypot(c->u_analyser_rel, c->u_filter_rel)), shared);
     r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
     r->u_scale_rel = fmax(r->u_scale_rel, c->u_scale_rel);
@@ -384,7 +251,7 @@ static int add_channel(struct reduction *r, const struct references *f,
     return GON_OK;
 }
 
-static int reduce_channels(struct reduction *r, const struct references *f,
+static int reduce_channels(struct reduction *r, const struct reduce_references *f,
                            const struct bench_config *bench, const struct plan *plan,
                            struct gon_error *err)
 {
@@ -404,19 +271,19 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
                struct gon_error *err)
 {
     struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
-    struct references f = {0};
+    struct reduce_references f;
     r.noise = reduce_noise_of(plan, rows, count);
     r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
     r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
     r.u_linearity_rel = bench->detector.u_linearity_rel;
-    int rc = collect(&f, plan, rows, count, err);
+    int rc = reduce_references_of(plan, rows, count, &f, err);
     if (rc >= 0)
         rc = reduce_dark(&r, &f, err);
     if (rc >= 0)
         rc = reduce_channels(&r, &f, bench, plan, err);
     if (rc >= 0)
         rc = reduce_points(&r, &f, plan, rows, count, err);
-    clear_references(&f);
+    reduce_references_clear(&f);
     if (rc < 0)
         return rc;
     reduce_add_leaks(&r, plan, bench);

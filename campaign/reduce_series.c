@@ -73,3 +73,8 @@ double reduce_series_u(const struct reduce_series *s)
         largest = fmax(largest, fabs(s->value[i].value - s->value[i - 1].value));
     return s->interpolated ? largest / 2 : scatter(s);
 }
+
+double reduce_series_samples(const struct reduce_series *s, int samples)
+{
+    return s->interpolated && s->count ? (double)samples / s->count : samples;
+}

@@ -26,6 +26,8 @@ double reduce_series_mean(const struct reduce_series *s);  // NAN when empty
 double reduce_series_least(const struct reduce_series *s); // NAN when empty
 // Linear in time between neighbours, before the first and after the last as that one.
 double reduce_series_at(const struct reduce_series *s, int64_t t_utc_ms);
+// Of all samples those that such a value rests on: all of a mean, one group's when interpolated.
+double reduce_series_samples(const struct reduce_series *s, int samples);
 // Standard uncertainty of that as its values tell it: of the mean, from their scatter (half the
 // difference of two); interpolated, half of the largest difference of neighbours, as what happened
 // between them may have happened at once. 0 for a single one.
