@@ -2,11 +2,12 @@
 """What keeps a run: a door and a thermometer simulated from a profile, the interlock, a lost device; pauses by name
 and at once."""
 import re
+import subprocess
 import time
 
 import pytest
 
-from conftest import QUICK_LASER, gonio, query, wait_for
+from conftest import BUILD, QUICK_LASER, gonio, query, wait_for
 
 PLAN = """\
 campaign: {
@@ -175,3 +176,12 @@ def test_a_wrong_suspender_is_refused(start_sim, tmp_path, line, says):
     bench = Bench(start_sim, tmp_path, more)
     r = gonio("check", bench.file, cwd=tmp_path)
     assert r.returncode == 2 and says in r.stdout + r.stderr, r
+
+
+def test_a_value_that_the_device_has_not_keeps_goniod_from_starting(start_sim, tmp_path):
+    more = SUSPENDERS.split("suspenders:")[0] + 'suspenders: ( { name = "s"; when = "room.bench > 2"; } );\n'
+    bench = Bench(start_sim, tmp_path, more)
+    r = subprocess.run([BUILD / "goniod", "--config", bench.file, "--socket", tmp_path / "s", "--dir", tmp_path / "d"],
+                       capture_output=True, text=True, timeout=30)
+    assert r.returncode == 2, r
+    assert 'room: has no value \'bench\', which suspender "s" names' in r.stderr, r
