@@ -1,9 +1,10 @@
 # gonio: builds everything into build/<variant>/ and links build/<program> to the release variant.
 #
-#   make                 the three programs            make demo     a whole campaign on the simulated bench
+#   make                 the four programs             make demo     a whole campaign on the simulated bench
 #   make check           unit and system tests         make layers   who may include whom
 #   make bench           what things cost, as a table and in build/bench.json
-#   make check-slow      statistics of the fit's intervals, faults of links, power cuts (minutes)
+#   make check-slow      statistics of the fit's intervals, faults of links, power cuts, simulated campaigns, deaths
+#   make coverage-guard  every branch of what decides that a laser goes off
 #   make install         PREFIX=/usr/local DESTDIR=    V=1           show the commands
 #
 # A variant is a compiler and its flags: release, clang, asan, debug. VARIANT=asan make check.
@@ -32,8 +33,9 @@ CFLAGS   := -std=c17 $(WARN) $(OPT_$(VARIANT)) -ffp-contract=off -fno-math-errno
 LDFLAGS  += -Wl,--as-needed $(filter -fsanitize% -fno-sanitize%,$(CFLAGS)) -pthread
 
 # The layers, and for each program the layers it is made of, users before what they use.
-LAYERS        := base model fit drivers campaign sim daemon cli
+LAYERS        := base model fit drivers campaign sim guard daemon cli
 USES_goniod   := daemon campaign drivers fit model base
+USES_gonio-guard := guard drivers base
 USES_gonio    := cli campaign drivers fit model base
 USES_goniosim := sim drivers model base
 LIBS_base     := -lconfig
@@ -42,8 +44,9 @@ LIBS_campaign := -lsqlite3 -ljansson
 LIBS_sim      := -ljansson
 LIBS_daemon   := -lmicrohttpd -ljansson
 LIBS_cli      := -lcurl -ljansson
-PROGRAMS      := goniod gonio goniosim
+PROGRAMS      := goniod gonio-guard gonio goniosim
 MAIN_goniod   := daemon
+MAIN_gonio-guard := guard
 MAIN_gonio    := cli
 MAIN_goniosim := sim
 
@@ -51,7 +54,7 @@ Q := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
 .DEFAULT_GOAL := all
-.PHONY: all bench check check-slow unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
+.PHONY: all bench check check-slow coverage-guard check-deaths unit system demo deps deps-check deps-bench layers install uninstall clean doc lint
 all: $(PROGRAMS:%=$(B)/%) build/share/gonio/profiles $(if $(filter release,$(VARIANT)),$(PROGRAMS:%=build/%))
 
 # --- objects, one archive a layer, programs -------------------------------------------------------
@@ -120,11 +123,25 @@ $(B)/tests/$(1): $(B)/obj/tests/slow/$(1).o $(patsubst %,$(B)/lib%.a,$(call slow
 endef
 $(foreach t,$(SLOW_TESTS),$(eval $(call slow_rules,$(t))))
 
-check-slow: $(SLOW_TESTS:%=$(B)/tests/%)
-	$(Q)set -e; for t in $^; do $$t; done
+# tests/dst: one program that simulates whole campaigns in virtual time, with libc's calls its own.
+DST_OBJ := $(patsubst %.c,$(B)/obj/%.o,$(wildcard tests/dst/*.c))
+DST_USES := $(shell sed -n 's,^// uses: *,,p' tests/dst/main.c)
+OBJECTS += $(DST_OBJ)
+$(B)/tests/dst: $(DST_OBJ) $(DST_USES:%=$(B)/lib%.a)
+	$(call say,LINK,$@)
+	$(Q)mkdir -p $(@D)
+	$(Q)$(CC) $(LDFLAGS) -o $@ $^ $(call libs_of,$(DST_USES))
 
-SHIM := $(B)/tests/libptycompat.so
-$(SHIM): tests/shim/ptycompat.c
+check-slow: $(SLOW_TESTS:%=$(B)/tests/%) $(B)/tests/dst
+	$(Q)set -e; for t in $^; do $$t; done
+	$(Q)$(MAKE) --no-print-directory check-deaths
+
+# goniod dies 1,000 times with the laser on, 250 times each way (an hour or so); in CI 80 times.
+check-deaths: all $(B)/tests/libmishap.so
+	$(Q)GONIO_BUILD=$(abspath $(B)) GONIO_JOBS=4 GONIO_GUARD_DEATHS=$(if $(CI),20,250) scripts/system -rP -k off_follows
+
+SHIMS := $(patsubst tests/shim/%.c,$(B)/tests/lib%.so,$(wildcard tests/shim/*.c))
+$(B)/tests/lib%.so: tests/shim/%.c
 	$(call say,LINK,$@)
 	$(Q)mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS) -std=c17 $(WARN) -O1 -g -fPIC -shared -o $@ $< -ldl
@@ -143,12 +160,12 @@ $(B)/tests/$(1): $(call usb_parts,$(1)) $(patsubst %,$(B)/lib%.a,$(call usb_name
 	    $(if $(filter usbsim,$(1)),-lumockdev -lgobject-2.0 -lglib-2.0)
 endef
 $(foreach u,$(USB_PROGRAMS),$(eval $(call usb_rules,$(u))))
-$(B)/obj/tests/usb/usbserver.o: CPPFLAGS += $(UMOCKDEV)
+$(B)/obj/tests/usb/usbserver.o $(B)/obj/tests/usb/ttyserver.o: CPPFLAGS += $(UMOCKDEV)
 
 unit: $(UNIT_TESTS:%=$(B)/tests/%)
 	$(Q)scripts/unit $(B)/tests $(UNIT_TESTS)
 
-system: all $(USB_PROGRAMS:%=$(B)/tests/%) $(if $(wildcard tests/shim/ptycompat.c),$(SHIM))
+system: all $(USB_PROGRAMS:%=$(B)/tests/%) $(SHIMS)
 	$(Q)GONIO_BUILD=$(abspath $(B)) scripts/system $(ARGS)
 
 # Parallel on its own unless the caller chose a number of jobs.
@@ -159,6 +176,9 @@ check: deps-check
 
 layers:
 	$(Q)scripts/layers
+
+coverage-guard:
+	$(Q)scripts/coverage-guard
 
 # --- bench ----------------------------------------------------------------------------------------
 # bench/NAME.c is a program when it names its layers ('// uses: fit model'); bench/NAME_*.c are its parts,
@@ -222,7 +242,7 @@ $(B)/man/%: doc/%.scd scripts/man $(PROGRAMS:%=$(B)/%)
 install: all doc
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/sbin $(DESTDIR)$(PREFIX)/share/gonio/configs
 	install -m755 $(B)/gonio $(B)/goniosim $(DESTDIR)$(PREFIX)/bin
-	install -m755 $(B)/goniod $(DESTDIR)$(PREFIX)/sbin
+	install -m755 $(B)/goniod $(B)/gonio-guard $(DESTDIR)$(PREFIX)/sbin
 	install -d $(DESTDIR)$(PREFIX)/share/gonio/profiles
 	install -m644 $(wildcard configs/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/configs
 	install -m644 $(wildcard configs/profiles/*.cfg) $(DESTDIR)$(PREFIX)/share/gonio/profiles
@@ -232,7 +252,7 @@ install: all doc
 	for page in $(notdir $(MAN)); do \
 	    install -D -m644 $(B)/man/$$page $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page || exit 1; done
 uninstall:
-	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(DESTDIR)$(PREFIX)/sbin/goniod
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(DESTDIR)$(PREFIX)/sbin/goniod $(DESTDIR)$(PREFIX)/sbin/gonio-guard
 	rm -rf $(DESTDIR)$(PREFIX)/share/gonio
 	rm -f $(DESTDIR)$(PREFIX)/lib/systemd/system/goniod.service $(DESTDIR)$(PREFIX)/lib/sysusers.d/gonio.conf
 	for page in $(notdir $(MAN)); do rm -f $(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$$page; done

@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { MOST_BYTES = 1 << 20 };
+enum { MOST_BYTES = 1 << 20, STRING_SHOWN = 40 };
 
 static void say(struct cfg_sink sink, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
@@ -72,9 +72,28 @@ static void show_hex(const struct cfg_file *f, const config_setting_t *s, char *
     snprintf(text, size, "0x%" PRIx32, half);
 }
 
+// Its first characters in quotes; terminators of lines as they are written in a file, so that they
+// end no line of a message.
+static void show_string(const char *string, char *text, size_t size)
+{
+    static const char controls[] = "\r\n\t\f", letters[] = "rntf";
+    size_t used = 0;
+    int shown = 0;
+    text[used++] = '"';
+    for (; string[shown] && shown < STRING_SHOWN && used + 9 < size; shown++) {
+        const unsigned char c = (unsigned char)string[shown];
+        const char *control = strchr(controls, c);
+        if (control)
+            used += (size_t)snprintf(text + used, size - used, "\\%c", letters[control - controls]);
+        else
+            used += (size_t)snprintf(text + used, size - used,
+                                     c < 0x20 || c == 0x7f ? "\\x%02x" : "%c", c);
+    }
+    snprintf(text + used, size - used, "%s\"", string[shown] ? "..." : "");
+}
+
 void cfg_show(const struct cfg_file *f, const config_setting_t *s, char *text, size_t size)
 {
-    const char *string;
     if (config_setting_get_format(s) == CONFIG_FORMAT_HEX) {
         show_hex(f, s, text, size);
         return;
@@ -91,8 +110,7 @@ void cfg_show(const struct cfg_file *f, const config_setting_t *s, char *text, s
         snprintf(text, size, "%s", config_setting_get_bool(s) ? "true" : "false");
         break;
     case CONFIG_TYPE_STRING:
-        string = config_setting_get_string(s);
-        snprintf(text, size, "\"%.40s%s\"", string, strlen(string) > 40 ? "..." : "");
+        show_string(config_setting_get_string(s), text, size);
         break;
     case CONFIG_TYPE_GROUP:
         snprintf(text, size, "{ ... }");

@@ -14,6 +14,7 @@ struct log; // where lines go and which are kept
 struct log *log_new(FILE *out, enum log_level most, int with_time);
 void log_free(struct log *log);
 
-// A NULL log drops the line. errno survives.
+// A NULL log drops the line. errno survives. Into a pipe, terminal or socket it never waits: a line
+// that finds no room because nobody reads is dropped, and how many were is said before the next one.
 void log_say(struct log *log, enum log_level level, const char *tag, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));

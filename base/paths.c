@@ -3,6 +3,7 @@
 
 #include <limits.h>
 #include <pwd.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,6 +40,18 @@ int paths_socket(char *ret_path, size_t size, struct gon_error *err)
         snprintf(path, sizeof path, "/run/goniod.sock");
     else
         snprintf(path, sizeof path, "/tmp/goniod-%ld/goniod.sock", (long)geteuid());
+    int rc = paths_socket_fits(path, err);
+    if (rc == 0)
+        snprintf(ret_path, size, "%s", path);
+    return rc;
+}
+
+int paths_guard(const char *socket, char *ret_path, size_t size, struct gon_error *err)
+{
+    char path[4096];
+    const size_t length = strlen(socket);
+    const bool ends = length > 5 && strcmp(socket + length - 5, ".sock") == 0;
+    snprintf(path, sizeof path, "%.*s-guard.sock", (int)(ends ? length - 5 : length), socket);
     int rc = paths_socket_fits(path, err);
     if (rc == 0)
         snprintf(ret_path, size, "%s", path);

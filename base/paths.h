@@ -13,6 +13,10 @@ int paths_socket(char *ret_path, size_t size, struct gon_error *err);
 // GON_E_INPUT when the path is empty or longer than the 107 bytes that a socket's address holds.
 int paths_socket_fits(const char *path, struct gon_error *err);
 
+// The STOP socket of the guard, beside the daemon's: goniod-guard.sock for goniod.sock. GON_E_INPUT
+// as above.
+int paths_guard(const char *socket, char *ret_path, size_t size, struct gon_error *err);
+
 // Another of gonio's programs: beside this one (as it was built), in ../bin (as installed), else its
 // name alone, for PATH to find.
 void paths_program(const char *name, char *ret_path, size_t size);

@@ -120,7 +120,11 @@ static int finish(struct dataset *d, const char *column, struct gon_error *err)
         return d->left_out ? gon_fail(err, GON_E_INPUT,
                                       "%s: no row is left: the choice of theta_i excludes all %zu",
                                       d->source, d->left_out)
-                           : gon_fail(err, GON_E_INPUT, "%s: no data", d->source);
+           : d->excluded ? gon_fail(err, GON_E_INPUT,
+                                    "%s: no row is left: %d readings are excluded; take some back: "
+                                    "gonio restore",
+                                    d->source, d->excluded)
+                         : gon_fail(err, GON_E_INPUT, "%s: no data", d->source);
     if (all_zero)
         return gon_fail(err, GON_E_INPUT, "%s: %s is zero in all %zu rows", d->source, column,
                         d->count);
@@ -338,6 +342,7 @@ static int take_points(const struct plan *plan, const struct reduction *r,
             d->left_out++;
     }
     d->u_scale = r->u_scale_rel;
+    d->excluded = r->excluded;
     return rc >= 0 ? finish(d, "f_r", err) : rc;
 }
 

@@ -35,6 +35,7 @@ struct dataset {
     unsigned char *pol_in, *pol_out; // enum brdf_state of each; NULL when all are u
     double u_scale;                  // relative standard uncertainty common to all; 0 from a CSV
     size_t left_out;                 // by the filter
+    int excluded;                    // readings of the campaign that somebody excluded
     char source[512];
     char note[200]; // what the numbers are not (reduction_warning), or what in the file looks like
                     // a mistake; "" when there is nothing to say

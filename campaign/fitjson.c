@@ -137,10 +137,10 @@ static json_t *warnings(const struct fit_record *f)
 char *fit_json(const struct fit_record *f, int indent)
 {
     const struct fit_result *r = &f->result;
-    json_t *o = json_pack("{s:s, s:s, s:s, s:I, s:I}", "method", fit_method_name(f->options.method),
+    json_t *o = json_pack("{s:s, s:s, s:s, s:I, s:i, s:I}", "method", fit_method_name(f->options.method),
                           "weights", fit_weighting_name(f->options.weighting), "diffuse",
                           fit_diffuse_name(f->options.diffuse), "points", (json_int_t)f->points,
-                          "seed", (json_int_t)f->options.seed);
+                          "excluded", f->excluded, "seed", (json_int_t)f->options.seed);
     if (f->sweep >= 0)
         json_object_set_new(o, "sweep", json_integer(f->sweep));
     json_object_set_new(o, "delta", number(r->delta));

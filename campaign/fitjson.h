@@ -19,6 +19,7 @@ struct fit_record {
     int sweep;         // after which; -1: not of a campaign
     int64_t reduction; // id in the file; 0: none
     size_t points;
+    int excluded;      // readings of the campaign that somebody excluded; 0 of a CSV
     struct fit_options options;
     struct fit_result result;
     const char *trace; // text, may be NULL
@@ -26,7 +27,7 @@ struct fit_record {
     char note[200]; // one more warning, of the data set; "": none
 };
 
-// {"method","weights","points","seed","delta","params":{...},"derived":{...},"correlation":[...],
+// {"method","weights","points","excluded","seed","delta","params":{...},"derived":{...},"correlation":[...],
 // "chi2_per_dof","residual_lag1","advice":[{"measure","text","readings","u":{..},"gain"},..],
 // "evaluations","elapsed_ms","elapsed_total_ms","warnings":[...]}, and where asked for
 // "bootstrap":{"replicas","noise","params":{..},"derived":{..}} and "hold_out":{"theta_i_deg":[..],

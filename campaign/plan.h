@@ -37,7 +37,9 @@ struct plan_point {
     int pol_in, pol_out;      // enum polarisation; unknown also where "laser" has no bench
     double weight;            // g of eq. 17
     bool dense;               // within the dense zone
-    bool done;                // has an accepted reading; false in a new plan
+    bool done;                // has an accepted reading that stands; false in a new plan
+    bool again;               // has accepted readings and is to be measured again all the same
+    int excluded;             // accepted readings that do not count, as somebody decided
     int attempts;             // readings there are, accepted or not; the last attempt's number
 };
 

@@ -12,19 +12,14 @@
 
 // --- which readings count ------------------------------------------------------------------------
 
-static bool accepted(const struct store_reading *r)
-{
-    return !(r->flags & STORE_REJECTING);
-}
-
-// Walks plan and rows together; both are in the plan's order. Returns the last accepted reading of
-// the point, or NULL.
+// Walks plan and rows together; both are in the plan's order. Returns the last reading of the
+// point that counts, or NULL.
 static const struct store_reading *reading_of(const struct plan_point *p,
                                               const struct store_reading *rows, int count, int *at)
 {
     const struct store_reading *found = NULL;
     for (; *at < count && rows[*at].sweep == p->sweep && rows[*at].point == p->point; (*at)++)
-        if (accepted(&rows[*at]))
+        if (store_reading_counts(&rows[*at]))
             found = &rows[*at];
     return found;
 }
@@ -159,8 +154,9 @@ static bool reduce_point(const struct reduction *r, const struct reduce_referenc
     return isfinite(p->f_per_sr);
 }
 
-static int reduce_points(struct reduction *r, const struct reduce_references *f, const struct plan *plan,
-                         const struct store_reading *rows, int count, struct gon_error *err)
+static int reduce_points(struct reduction *r, const struct reduce_references *f,
+                         const struct plan *plan, const struct store_reading *rows, int count,
+                         struct gon_error *err)
 {
     r->points = calloc((size_t)plan->samples + 1, sizeof *r->points);
     if (!r->points)
@@ -190,15 +186,31 @@ static int reduce_points(struct reduction *r, const struct reduce_references *f,
 
 // --- all of it -----------------------------------------------------------------------------------
 
-static int reduce_dark(struct reduction *r, const struct reduce_references *f, struct gon_error *err)
+static int none_left(const char *what, int excluded, struct gon_error *err)
 {
+    return gon_fail(err, GON_E_INPUT,
+                    "no %s reading is left, %d %s excluded: without one there is no absolute BRDF; "
+                    "take one back: gonio restore",
+                    what, excluded, excluded == 1 ? "is" : "are");
+}
+
+static int reduce_dark(struct reduction *r, const struct reduce_references *f,
+                       struct gon_error *err)
+{
+    int excluded_beams = 0;
     r->darks = f->dark_signal.count;
     for (int i = 0; i < POL_COUNT; i++)
         r->beams += f->beam[i].signal.count;
     r->reference = reduce_reference_means(f);
-    r->u_dark_v =
-        hypot(reduce_series_u(&f->dark_signal),
-              without_nan(r->noise.floor_v) / sqrt(reduce_series_samples(&f->dark_signal, f->dark_samples)));
+    r->u_dark_v = hypot(reduce_series_u(&f->dark_signal),
+                        without_nan(r->noise.floor_v) /
+                            sqrt(reduce_series_samples(&f->dark_signal, f->dark_samples)));
+    for (int i = 0; i < POL_COUNT; i++)
+        excluded_beams += f->beam[i].excluded;
+    if (!r->darks && f->dark_excluded)
+        return none_left("dark", f->dark_excluded, err);
+    if (r->darks && !r->beams && excluded_beams)
+        return none_left("beam", excluded_beams, err);
     if (!r->darks || !r->beams)
         return gon_fail(err, GON_E_INPUT, "no %s reading yet: without it there is no absolute BRDF",
                         r->darks ? "beam" : "dark");
@@ -208,7 +220,12 @@ static int reduce_dark(struct reduction *r, const struct reduce_references *f, s
 static int check_beam(const struct reduction *r, const struct reduce_beam *beam, int pol_in,
                       struct gon_error *err)
 {
+    char what[40];
     const double ratio = reduce_series_mean(&beam->ratio);
+    snprintf(what, sizeof what, "beam (pol_in = \"%s\")",
+             polarisation_name((enum polarisation)pol_in));
+    if (!beam->signal.count && beam->excluded)
+        return none_left(what, beam->excluded, err);
     if (!beam->signal.count)
         return gon_fail(err, GON_E_INPUT,
                         "no beam reading yet of pol_in = \"%s\": without it there is no absolute "
@@ -240,9 +257,9 @@ static int add_channel(struct reduction *r, const struct reduce_references *f,
     c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
                                             &c->u_analyser_rel);
     c->beam_ratio /= bench_beam_passes(bench, &c->u_filter_rel);
-    c->u_beam_rel =
-        hypot(reduce_series_u(&beam->ratio) / ratio,
-              hypot(noise, r->noise.rel_monitor) / sqrt(reduce_series_samples(&beam->ratio, beam->samples)));
+    c->u_beam_rel = hypot(reduce_series_u(&beam->ratio) / ratio,
+                          hypot(noise, r->noise.rel_monitor) /
+                              sqrt(reduce_series_samples(&beam->ratio, beam->samples)));
     c->u_scale_rel = hypot(hypot(c->u_beam_rel, hypot(c->u_analyser_rel, c->u_filter_rel)), shared);
     r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
     r->u_scale_rel = fmax(r->u_scale_rel, c->u_scale_rel);
@@ -273,6 +290,8 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
     struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
     struct reduce_references f;
     r.noise = reduce_noise_of(plan, rows, count);
+    for (int i = 0; i < count; i++)
+        r.excluded += !(rows[i].flags & STORE_REJECTING) && !store_reading_counts(&rows[i]);
     r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
     r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
     r.u_linearity_rel = bench->detector.u_linearity_rel;

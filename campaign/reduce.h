@@ -7,12 +7,14 @@
 //
 // S signal, M monitor (1 without one), D dark with the laser off, 0 the beam; Omega = pi r^2/d^2.
 // Opening and closing beam and dark are averaged; half their difference is part of their
-// uncertainty. Angles are those of the encoders.
+// uncertainty. Angles are those of the encoders. Excluded readings (campaign/store_exclude.h) count
+// nowhere.
 //
-// After a gap (a pause, a stop) the opening references are measured again: further accepted readings
-// of the same points. Each reading is then reduced with what the references before and after it
-// give, linear in time between them (campaign/reduce_series.h); their uncertainty has half of the
-// largest difference of neighbours, for all readings.
+// References may be measured again, as further accepted readings of the same points: the opening
+// ones after a gap (a pause, a stop), opening and closing ones with a sweep that is measured again.
+// All that count are kept. Each reading is then reduced with what the references before and after
+// it give, linear in time between them (campaign/reduce_series.h), so that each day has its own;
+// their uncertainty has half of the largest difference of neighbours, for all readings.
 //
 // Each reading is divided by the beam of its own pol_in, which is measured without analyser; f of
 // a reading behind the analyser is divided by its transmission T as well, so that f = 1/2 a^T F g
@@ -74,6 +76,7 @@ struct reduction {
     int left_out;     // points on the sample that were measured and could not be reduced (cosine,
                       // monitor)
     int beams, darks; // how many readings the references are means of
+    int excluded;     // accepted readings, references too, that do not count, as somebody decided
     double omega_sr;
     struct reduce_reference reference;
     double u_dark_v; // of the dark signal's mean
@@ -93,7 +96,7 @@ struct reduction {
 int reduction_warning(const struct reduction *r, char *text, size_t size);
 
 // Rows as store_read_readings gives them (-1). GON_E_INPUT: no dark yet, or no beam in one of
-// the light's states, or a beam that is not above the dark.
+// the light's states, or all of them excluded; or a beam that is not above the dark.
 int reduce_run(const struct bench_config *bench, const struct plan *plan,
                const struct store_reading *rows, int count, struct reduction *ret_reduction,
                struct gon_error *err);

@@ -3,22 +3,17 @@
 
 #include <math.h>
 
-static bool accepted(const struct store_reading *r)
-{
-    return !(r->flags & STORE_REJECTING);
-}
-
 static double without_nan(double value)
 {
     return isnan(value) ? 0 : value;
 }
 
-// The next accepted reading of the point; NULL: no more.
+// The next reading of the point that counts; NULL: no more.
 static const struct store_reading *next_of(const struct plan_point *p,
                                            const struct store_reading *rows, int count, int *at)
 {
     for (; *at < count && rows[*at].sweep == p->sweep && rows[*at].point == p->point; (*at)++)
-        if (accepted(&rows[*at]))
+        if (store_reading_counts(&rows[*at]))
             return &rows[(*at)++];
     return NULL;
 }
@@ -69,6 +64,20 @@ static bool was_measured_again(const struct plan *plan, const struct store_readi
     return false;
 }
 
+// Accepted readings that do not count, as somebody decided.
+static void count_excluded(struct reduce_references *f, const struct plan *plan,
+                           const struct store_reading *rows, int count)
+{
+    for (int i = 0, at = 0; i < plan->count; i++) {
+        const struct plan_point *p = &plan->points[i];
+        int n = 0;
+        for (; at < count && rows[at].sweep == p->sweep && rows[at].point == p->point; at++)
+            n += !(rows[at].flags & STORE_REJECTING) && !store_reading_counts(&rows[at]);
+        f->dark_excluded += p->kind == PLAN_DARK ? n : 0;
+        f->beam[p->pol_in].excluded += p->kind == PLAN_BEAM ? n : 0;
+    }
+}
+
 static int add_references(struct reduce_references *f, enum plan_kind kind, const struct plan *plan,
                           const struct store_reading *rows, int count, struct gon_error *err)
 {
@@ -90,6 +99,7 @@ int reduce_references_of(const struct plan *plan, const struct store_reading *ro
 {
     struct reduce_references *f = ret_references;
     *f = (struct reduce_references){.again = was_measured_again(plan, rows, count)};
+    count_excluded(f, plan, rows, count);
     f->dark_signal.interpolated = f->dark_monitor.interpolated = f->again;
     int rc = add_references(f, PLAN_DARK, plan, rows, count, err);
     return rc < 0 ? rc : add_references(f, PLAN_BEAM, plan, rows, count, err);

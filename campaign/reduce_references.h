@@ -7,16 +7,18 @@
 struct reduce_beam {
     struct reduce_series signal, monitor, ratio; // ratio: over its dark
     int samples, out;                            // out: what stood before the detector
+    int excluded;                                // readings
 };
 
 struct reduce_references {
     struct reduce_series dark_signal, dark_monitor;
-    int dark_samples;
+    int dark_samples, dark_excluded;
     struct reduce_beam beam[POL_COUNT]; // by the light's state
-    bool again;                         // one was measured again, after a gap
+    bool again;                         // one was measured again: after a gap, or with a sweep
 };
 
-// Every accepted reading of a dark or a beam. GON_E_SYSTEM; to be cleared also then.
+// Every reading that counts of a dark or a beam: one that was measured again stands beside the
+// earlier ones. GON_E_SYSTEM; to be cleared also then.
 int reduce_references_of(const struct plan *plan, const struct store_reading *rows, int count,
                          struct reduce_references *ret_references, struct gon_error *err);
 void reduce_references_clear(struct reduce_references *f);

@@ -28,8 +28,8 @@ static int busy(struct store *s, struct gon_error *err)
                     s->path, who);
 }
 
-// Room for what is to be said of it; a quota is an I/O error for SQLite, and so is a full disk where
-// it makes its -shm file.
+// Room for what is to be said of it; a quota is an I/O error for SQLite, and so is a full disk
+// where it makes its -shm file.
 static int full(struct store *s, int rc, struct gon_error *err)
 {
     s->broken = s->broken || (rc & 0xff) == SQLITE_IOERR;
@@ -111,7 +111,7 @@ int store_db_end(struct store *s, int rc, struct gon_error *err)
 
 // --- opening -------------------------------------------------------------------------------------
 
-static void close_db(struct store *s)
+void store_db_close(struct store *s)
 {
     sqlite3_close(s->db);
     s->db = NULL;
@@ -121,7 +121,7 @@ static int open_db(struct store *s, int flags, struct gon_error *err)
 {
     if (sqlite3_open_v2(s->path, &s->db, flags | SQLITE_OPEN_NOMUTEX, NULL) != SQLITE_OK) {
         store_db_fail(s, err);
-        close_db(s);
+        store_db_close(s);
         return GON_E_STORE;
     }
     sqlite3_extended_result_codes(s->db, 1);
@@ -205,12 +205,12 @@ static int count_readings(struct store *s, struct gon_error *err)
     return rc;
 }
 
-static void wal_path(const struct store *s, char *path, size_t size)
+void store_wal_path(const struct store *s, char *path, size_t size)
 {
     snprintf(path, size, "%s-wal", s->path);
 }
 
-static int open_for_writing(struct store *s, struct gon_error *err)
+int store_db_reopen(struct store *s, struct gon_error *err)
 {
     char wal[sizeof s->path + 8];
     int rc = open_db(s, SQLITE_OPEN_READWRITE, err);
@@ -225,10 +225,10 @@ static int open_for_writing(struct store *s, struct gon_error *err)
     if (rc >= 0)
         rc = count_readings(s, err);
     if (rc < 0) {
-        close_db(s);
+        store_db_close(s);
         return rc;
     }
-    wal_path(s, wal, sizeof wal);
+    store_wal_path(s, wal, sizeof wal);
     store_watch_begin(&s->file, s->path);
     store_watch_begin(&s->wal, wal);
     s->broken = false;
@@ -267,7 +267,7 @@ int store_open(const char *path, enum store_mode mode, struct store **ret_store,
     if (rc >= 0 && mode == STORE_WRITE)
         rc = store_lock_take(&s->lock, path, err);
     if (rc >= 0)
-        rc = mode == STORE_WRITE ? open_for_writing(s, err) : open_for_reading(s, err);
+        rc = mode == STORE_WRITE ? store_db_reopen(s, err) : open_for_reading(s, err);
     if (rc >= 0 && mode == STORE_WRITE)
         rc = check_newest(s, err);
     if (rc >= 0 && mode == STORE_WRITE)
@@ -317,7 +317,9 @@ int store_close(struct store *s, struct gon_error *err)
             (sqlite3_errcode(s->db) & 0xff) != SQLITE_LOCKED)
             rc = store_db_fail(s, err);
     }
-    close_db(s);
+    store_watch_end(&s->file);
+    store_watch_end(&s->wal);
+    store_db_close(s);
     if (s->lock.fd >= 0) // ours
         store_reserve_give(s->path);
     store_lock_drop(&s->lock);
@@ -357,7 +359,7 @@ static int write_file(const char *path, const struct store_new *what, struct gon
         rc = store_db_run(&s, "PRAGMA synchronous = FULL", err);
     if (rc >= 0)
         rc = store_write_new(&s, what, err);
-    close_db(&s);
+    store_db_close(&s);
     return rc;
 }
 
@@ -382,48 +384,4 @@ int store_create(const char *path, const struct store_new *what, struct store **
         rc = gon_fail(err, GON_E_STORE, "the folder of %s: %s", path, strerror(errno));
     unlink(temporary);
     return rc >= 0 ? store_open(path, STORE_WRITE, ret_store, err) : rc;
-}
-
-// --- ready to write ------------------------------------------------------------------------------
-
-static int check_file(struct store *s, struct gon_error *err)
-{
-    const long long before = (long long)s->file.size;
-    switch (store_watch_look(&s->file, s->path)) {
-    case STORE_SEEN_SAME: return GON_OK;
-    case STORE_SEEN_CUT:
-        return gon_fail(err, GON_E_STORE,
-                        "%s: was cut while it was written (it had %lld bytes); keep it and its "
-                        "-wal file, and restore it from a copy",
-                        s->path, before);
-    case STORE_SEEN_OTHER: break;
-    }
-    return gon_fail(err, GON_E_STORE,
-                    "%s: was moved, removed or replaced while it was written; put it back",
-                    s->path);
-}
-
-// What is in a WAL that was removed still reaches the file through the descriptors that are open.
-static void check_wal(struct store *s)
-{
-    char wal[sizeof s->path + 8];
-    wal_path(s, wal, sizeof wal);
-    if (s->broken || store_watch_look(&s->wal, wal) == STORE_SEEN_SAME)
-        return;
-    sqlite3_exec(s->db, "PRAGMA wal_checkpoint(TRUNCATE)", NULL, NULL, NULL);
-    s->broken = true;
-}
-
-int store_db_ready(struct store *s, struct gon_error *err)
-{
-    if (s->mode != STORE_WRITE)
-        return gon_fail(err, GON_E_REFUSED, "%s: open for reading only", s->path);
-    int rc = check_file(s, err);
-    if (rc >= 0)
-        check_wal(s);
-    if (rc >= 0 && s->broken) {
-        close_db(s);
-        rc = open_for_writing(s, err);
-    }
-    return rc;
 }

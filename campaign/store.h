@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A campaign is one SQLite file: plan, configuration, bench and the instruments' profiles as they
 // were, every reading with every attempt, reductions, fits, events. Readings are added, never changed. Acknowledged means
-// committed.
+// committed. What is not to count is said in rows of their own (store_exclude.h).
 //
 // While it is written: WAL, synchronous=FULL, a commit a call. Closed: a single file. One writer at
 // a time, held by a lock on "FILE-lock" beside it, which names its process; readers never wait for
@@ -19,7 +19,8 @@
 //   int32 count, range; uint32 flags.
 // A row that fails it is an error that names sweep and point, whenever it is read. The plan, the
 // configuration and the bench have one check value each (meta: plan_crc32c, ...), a profile that of
-// int64 t_utc_ms and of name, role and text with their final NULs.
+// int64 t_utc_ms and of name, role and text with their final NULs, an exclusion that of int64 id,
+// t_utc_ms; int32 sweep, point, attempt; and of what, reason and who with their final NULs.
 //
 // A file of an older version is read as it is; opened for writing it becomes one of this version
 // (store_migrate.c), after a copy of it was put beside it.
@@ -53,6 +54,9 @@ enum store_flag {
 // A reading with any of these does not count as the point's.
 #define STORE_REJECTING 0xffu
 
+// What people decided later (store_exclude.h).
+enum store_standing { STORE_COUNTS, STORE_EXCLUDED, STORE_REPLACED, STORE_REPEATED };
+
 struct store_reading {
     int sweep, point, attempt; // attempt from 1
     int64_t t_utc_ms;
@@ -62,12 +66,15 @@ struct store_reading {
     int count;                          // samples averaged, >= 1
     int range;                          // of the detector
     unsigned flags;                     // of store_flag
+    enum store_standing standing;       // of the newest decision; no part of the row
 };
 
 struct store_progress {
     int done, total;  // points
+    int again;        // points that were done and are to be measured again
     int sweep, point; // the first without an accepted reading; -1 when there is none
     int64_t readings; // rows: every attempt
+    int64_t excluded; // of them accepted ones that do not count, as somebody decided
     int sweeps_done;  // 1..sweeps that are complete
     int sweeps;
 };
@@ -182,3 +189,5 @@ char *store_read_fit(struct store *s, int sweep);
 int store_read_fits(struct store *s, int64_t *ret_ids, int *ret_sweeps, int most,
                     struct gon_error *err);
 int store_flags_text(unsigned flags, char *text, size_t size); // "saturated, moved"; as snprintf
+bool store_reading_counts(const struct store_reading *r);  // may be used
+bool store_reading_settles(const struct store_reading *r); // its point need not be measured again

@@ -155,7 +155,7 @@ static int put_reduction(struct store *s, int64_t t_utc_ms, const struct reducti
     int rc = store_db_prepare(
         s,
         "INSERT INTO reduction VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12,"
-        " ?13, ?14, ?15, ?16, ?17, ?18, ?19)",
+        " ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20)",
         &q, err);
     if (rc < 0)
         return rc;
@@ -166,6 +166,7 @@ static int put_reduction(struct store *s, int64_t t_utc_ms, const struct reducti
     sqlite3_bind_int(q, 5, r->left_out);
     for (int i = 0; i < (int)(sizeof values / sizeof *values); i++)
         sqlite3_bind_double(q, 6 + i, values[i]);
+    sqlite3_bind_int(q, 20, r->excluded);
     return store_db_finish(s, q, err);
 }
 

@@ -3,6 +3,7 @@
 //   1  points of one state of polarisation
 //   2  the same tables; points of several states: their beams must not be averaged
 //   3  the profiles of the instruments are kept, in a table of their own; any states
+//   4  readings can be excluded, in a table of its own; a reduction says how many were
 #include "campaign/store_db.h"
 
 #include <stdio.h>
@@ -12,7 +13,7 @@ enum { MOST_BACKUPS = 100 };
 
 // What makes version i + 2 of version i + 1. A step never changes once a gonio with it was given
 // away.
-static const char *const steps[] = {"", store_profile_sql};
+static const char *const steps[] = {"", store_profile_sql, store_exclusion_sql};
 _Static_assert(sizeof steps / sizeof *steps == STORE_VERSION - 1, "a step for each version");
 
 // A copy is never overwritten: it may be of what the file was before somebody restored it.

@@ -85,7 +85,10 @@ static void mark_done(struct plan *p, const struct store_reading *rows, int coun
         struct plan_point *point = &p->points[i];
         for (; k < count && rows[k].sweep == point->sweep && rows[k].point == point->point; k++) {
             point->attempts = rows[k].attempt;
-            point->done = point->done || !(rows[k].flags & STORE_REJECTING);
+            const bool accepted = !(rows[k].flags & STORE_REJECTING);
+            point->done = point->done || store_reading_settles(&rows[k]);
+            point->again = !point->done && (point->again || accepted);
+            point->excluded += accepted && !store_reading_counts(&rows[k]);
         }
     }
 }
@@ -141,7 +144,9 @@ int store_read_progress(struct store *s, struct store_progress *ret_progress, st
         const struct plan_point *point = &p.points[i];
         open = i && p.points[i - 1].sweep == point->sweep ? open + !point->done : !point->done;
         progress.done += point->done;
+        progress.again += point->again;
         progress.readings += point->attempts;
+        progress.excluded += point->excluded;
         if (!point->done && progress.sweep < 0) {
             progress.sweep = point->sweep;
             progress.point = point->point;
@@ -206,16 +211,20 @@ int store_read_readings(struct store *s, int sweep, struct store_reading **ret_r
 {
     sqlite3_stmt *q;
     struct store_reading *rows = NULL;
-    int rc =
-        store_db_prepare(s,
-                         "SELECT " STORE_READING_COLUMNS
-                         " FROM reading WHERE ?1 < 0 OR sweep = ?1 ORDER BY sweep, point, attempt",
-                         &q, err);
+    // Two statements: a condition for both would read the whole table for one sweep.
+    const char *sql = sweep < 0 ? "SELECT " STORE_READING_COLUMNS
+                                  " FROM reading ORDER BY sweep, point, attempt"
+                                : "SELECT " STORE_READING_COLUMNS
+                                  " FROM reading WHERE sweep = ?1 ORDER BY point, attempt";
+    int rc = store_db_prepare(s, sql, &q, err);
     if (rc < 0)
         return rc;
-    sqlite3_bind_int(q, 1, sweep);
+    if (sweep >= 0)
+        sqlite3_bind_int(q, 1, sweep);
     rc = read_rows(s, q, &rows, err);
     sqlite3_finalize(q);
+    if (rc > 0)
+        rc = store_take_standings(s, rows, rc, err);
     if (rc < 0)
         free(rows);
     else

@@ -27,6 +27,42 @@
 
 const char store_profile_sql[] = PROFILE_TABLE;
 
+// The view has what does not count now.
+#define EXCLUSION_TABLE \
+    "CREATE TABLE exclusion (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL," \
+    " sweep INTEGER NOT NULL, point INTEGER NOT NULL, attempt INTEGER NOT NULL," \
+    " what TEXT NOT NULL, reason TEXT NOT NULL CHECK (reason <> ''), who TEXT NOT NULL," \
+    " crc32c INTEGER NOT NULL);" \
+    "CREATE INDEX exclusion_reading ON exclusion (sweep, point, attempt);" \
+    NEVER("UPDATE", "exclusion", "exclusions are never changed") \
+    NEVER("DELETE", "exclusion", "exclusions are never removed") \
+    "CREATE VIEW excluded AS SELECT sweep, point, attempt, what, reason, who, t_utc_ms" \
+    " FROM exclusion e WHERE what IN ('excluded', 'replaced') AND id = (SELECT max(id)" \
+    " FROM exclusion n WHERE n.sweep = e.sweep AND n.point = e.point AND n.attempt = e.attempt);"
+
+// Every reading on the sample; f_r of the newest reduction for those that it used and that still
+// count.
+#define BRDF_VIEW \
+    "CREATE VIEW reading_brdf AS SELECT r.sweep, r.point, r.attempt, r.t_utc_ms," \
+    " p.theta_i_udeg / 1e6 AS theta_i_nominal_deg," \
+    " p.theta_r_udeg / 1e6 AS theta_r_signed_nominal_deg," \
+    " r.theta_i_udeg / 1e6 AS theta_i_deg, r.theta_r_udeg / 1e6 AS theta_r_signed_deg," \
+    " p.phi_udeg / 1e6 AS phi_deg, p.pol_in, p.pol_out, p.weight AS g," \
+    " d.f_r_per_sr AS f_r, d.u_a_per_sr AS u_A, d.u_b_per_sr AS u_B, r.flags," \
+    " r.signal_v, r.signal_sd_v, r.monitor_v, r.monitor_sd_v, r.samples, r.detector_range," \
+    " x.reason AS excluded" \
+    " FROM reading r JOIN plan p ON p.sweep = r.sweep AND p.point = r.point" \
+    " LEFT JOIN excluded x ON x.sweep = r.sweep AND x.point = r.point AND x.attempt = r.attempt" \
+    " LEFT JOIN reduced d ON d.reduction = (SELECT max(id) FROM reduction)" \
+    " AND d.sweep = r.sweep AND d.point = r.point AND d.attempt = r.attempt" \
+    " AND x.reason IS NULL WHERE p.kind = 'sample';"
+
+const char store_exclusion_sql[] =
+    "ALTER TABLE reduction ADD COLUMN excluded INTEGER NOT NULL DEFAULT 0;"
+    EXCLUSION_TABLE
+    "DROP VIEW reading_brdf;"
+    BRDF_VIEW;
+
 const char store_schema_sql[] =
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value) WITHOUT ROWID;"
 
@@ -45,6 +81,8 @@ const char store_schema_sql[] =
 
     PROFILE_TABLE
 
+    EXCLUSION_TABLE
+
     "CREATE TABLE event (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL, level TEXT NOT NULL,"
     " source TEXT NOT NULL, text TEXT NOT NULL);"
     "CREATE TABLE state (id INTEGER PRIMARY KEY, t_utc_ms INTEGER NOT NULL, state TEXT NOT NULL,"
@@ -55,7 +93,7 @@ const char store_schema_sql[] =
     " left_out INTEGER NOT NULL, omega_sr REAL, beam_signal_v REAL, beam_monitor_v REAL,"
     " dark_signal_v REAL, dark_monitor_v REAL, u_dark_v REAL, noise_floor_v REAL, noise_rel REAL,"
     " noise_monitor_rel REAL, u_beam_rel REAL, u_radius_rel REAL, u_distance_rel REAL,"
-    " u_linearity_rel REAL, u_scale_rel REAL);"
+    " u_linearity_rel REAL, u_scale_rel REAL, excluded INTEGER NOT NULL DEFAULT 0);"
     "CREATE TABLE reduced (reduction INTEGER, sweep INTEGER, point INTEGER,"
     " attempt INTEGER NOT NULL, f_r_per_sr REAL NOT NULL, u_a_per_sr REAL,"
     " u_b_per_sr REAL NOT NULL, PRIMARY KEY (reduction, sweep, point)) WITHOUT ROWID;"
@@ -69,18 +107,7 @@ const char store_schema_sql[] =
     "chi2_per_dof REAL, warnings INTEGER NOT NULL, evaluations INTEGER, elapsed_ms REAL,"
     " elapsed_total_ms REAL, json TEXT NOT NULL, trace TEXT);"
 
-    // Every reading on the sample; f_r of the newest reduction for those that it used.
-    "CREATE VIEW reading_brdf AS SELECT r.sweep, r.point, r.attempt, r.t_utc_ms,"
-    " p.theta_i_udeg / 1e6 AS theta_i_nominal_deg,"
-    " p.theta_r_udeg / 1e6 AS theta_r_signed_nominal_deg,"
-    " r.theta_i_udeg / 1e6 AS theta_i_deg, r.theta_r_udeg / 1e6 AS theta_r_signed_deg,"
-    " p.phi_udeg / 1e6 AS phi_deg, p.pol_in, p.pol_out, p.weight AS g,"
-    " d.f_r_per_sr AS f_r, d.u_a_per_sr AS u_A, d.u_b_per_sr AS u_B, r.flags,"
-    " r.signal_v, r.signal_sd_v, r.monitor_v, r.monitor_sd_v, r.samples, r.detector_range"
-    " FROM reading r JOIN plan p ON p.sweep = r.sweep AND p.point = r.point"
-    " LEFT JOIN reduced d ON d.reduction = (SELECT max(id) FROM reduction)"
-    " AND d.sweep = r.sweep AND d.point = r.point AND d.attempt = r.attempt"
-    " WHERE p.kind = 'sample';"
+    BRDF_VIEW
 
     "CREATE VIEW fit_result AS SELECT id, t_utc_ms, sweep, method, weights, diffuse, seed, points,"
     " delta, " RESULT("n") RESULT("k") RESULT("sigma") RESULT("ks") RESULT("kd")

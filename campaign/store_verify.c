@@ -2,6 +2,7 @@
 #include "campaign/store_verify.h"
 
 #include "campaign/store_db.h"
+#include "campaign/store_exclude.h"
 #include "campaign/store_row.h"
 
 #include <math.h>
@@ -96,6 +97,15 @@ static bool has(struct verify *v, const char *type, const char *name)
     return there;
 }
 
+// Whether what belongs to a table or view came with a later version than the file's.
+static bool is_later(const struct verify *v, const char *table)
+{
+    if (!strcmp(table, "profile"))
+        return v->seen.version < STORE_VERSION_PROFILES;
+    return (!strcmp(table, "exclusion") || !strcmp(table, "excluded")) &&
+           v->seen.version < STORE_VERSION_EXCLUSIONS;
+}
+
 // Every table, view and trigger that a new file has.
 static void check_schema(struct verify *v)
 {
@@ -107,8 +117,7 @@ static void check_schema(struct verify *v)
         sqlite3_prepare_v2(fresh, "SELECT type, name, tbl_name FROM sqlite_schema", -1, &q, NULL) ==
             SQLITE_OK)
         while (sqlite3_step(q) == SQLITE_ROW) {
-            const bool later =
-                v->seen.version < STORE_VERSION_PROFILES && !strcmp(text_of(q, 2), "profile");
+            const bool later = is_later(v, text_of(q, 2));
             snprintf(text, sizeof text, "the %s %s is missing", text_of(q, 0), text_of(q, 1));
             if (!later && !has(v, text_of(q, 0), text_of(q, 1)))
                 find(v, "structure", -1, -1, -1, text);
@@ -199,6 +208,34 @@ static void check_profiles(struct verify *v)
             find(v, "profile", -1, -1, -1, text);
     }
     end_part(v, "profile", q, step);
+}
+
+// A row that is gone would make a reading count again, or no longer.
+static void check_exclusions(struct verify *v)
+{
+    char text[200];
+    int step;
+    if (v->seen.version < STORE_VERSION_EXCLUSIONS)
+        return;
+    sqlite3_stmt *q = begin_part(
+        v, "exclusion", "SELECT " STORE_EXCLUSION_COLUMNS " FROM exclusion ORDER BY id");
+    if (!q)
+        return;
+    for (int64_t last = 0; (step = sqlite3_step(q)) == SQLITE_ROW; v->seen.exclusions++) {
+        const struct store_exclusion e = store_db_exclusion(q);
+        snprintf(text, sizeof text, "exclusion %lld is missing before %lld", (long long)last + 1,
+                 (long long)e.id);
+        if (e.id != last + 1)
+            find(v, "exclusion", -1, -1, -1, text);
+        last = e.id;
+        snprintf(text, sizeof text,
+                 "exclusion %lld (sweep %d, point %d, attempt %d): its check value is wrong",
+                 (long long)e.id, e.sweep, e.point, e.attempt);
+        if (sqlite3_column_int64(q, STORE_EXCLUSION_CRC) != store_exclusion_crc(&e) ||
+            store_standing_of(e.what) < 0)
+            find(v, "exclusion", e.sweep, e.point, e.attempt, text);
+    }
+    end_part(v, "exclusion", q, step);
 }
 
 // --- readings beside the plan --------------------------------------------------------------------
@@ -334,10 +371,28 @@ static const char *const references[] = {
     " WHERE NOT json_valid(json)",
 };
 
-static void check_references(struct verify *v)
+// The same of exclusions.
+static const char *const decided[] = {
+    "SELECT sweep, point, attempt, format('exclusion %d is of sweep %d, point %d, attempt %d, which"
+    " is not there', id, sweep, point, attempt) FROM exclusion e"
+    " WHERE NOT EXISTS (SELECT 1 FROM reading r WHERE r.sweep = e.sweep AND r.point = e.point"
+    " AND r.attempt = e.attempt)",
+
+    // With another newer row the point has been settled by hand.
+    "SELECT e.sweep, e.point, e.attempt, format('the state is done, but sweep %d, point %d is to be"
+    " measured again, as exclusion %d says', e.sweep, e.point, e.id) FROM exclusion e"
+    " WHERE e.what IN ('replaced', 'repeated')"
+    " AND (SELECT state FROM state ORDER BY id DESC LIMIT 1) = 'done'"
+    " AND NOT EXISTS (SELECT 1 FROM reading r WHERE r.sweep = e.sweep AND r.point = e.point"
+    " AND (r.flags & 255) = 0 AND coalesce((SELECT what FROM exclusion n WHERE n.sweep = r.sweep"
+    " AND n.point = r.point AND n.attempt = r.attempt ORDER BY id DESC LIMIT 1), 'restored')"
+    " IN ('restored', 'excluded'))",
+};
+
+static void check_references(struct verify *v, const char *const *queries, size_t most)
 {
-    for (size_t i = 0; i < sizeof references / sizeof *references; i++) {
-        sqlite3_stmt *q = begin_part(v, "reference", references[i]);
+    for (size_t i = 0; i < most; i++) {
+        sqlite3_stmt *q = begin_part(v, "reference", queries[i]);
         int step;
         if (!q)
             continue;
@@ -346,8 +401,6 @@ static void check_references(struct verify *v)
                  sqlite3_column_int(q, 2), text_of(q, 3));
         end_part(v, "reference", q, step);
     }
-    v->seen.reductions = count(v, "SELECT count(*) FROM reduction");
-    v->seen.fits = count(v, "SELECT count(*) FROM fit");
 }
 
 int store_verify(struct store *s, void (*found)(void *ctx, const struct store_finding *f),
@@ -361,8 +414,13 @@ int store_verify(struct store *s, void (*found)(void *ctx, const struct store_fi
     check_schema(&v);
     check_texts(&v);
     check_profiles(&v);
+    check_exclusions(&v);
     check_readings(&v);
-    check_references(&v);
+    check_references(&v, references, sizeof references / sizeof *references);
+    if (s->version >= STORE_VERSION_EXCLUSIONS)
+        check_references(&v, decided, sizeof decided / sizeof *decided);
+    v.seen.reductions = count(&v, "SELECT count(*) FROM reduction");
+    v.seen.fits = count(&v, "SELECT count(*) FROM fit");
     sqlite3_exec(s->db, "ROLLBACK", NULL, NULL, NULL);
     *ret_verified = v.seen;
     return GON_OK;

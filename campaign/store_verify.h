@@ -7,15 +7,15 @@
 #include "campaign/store.h"
 
 struct store_finding {
-    const char *what; // "structure", "meta", "config", "bench", "plan", "profile", "reading",
-                      // "hole", "reference", "state"
+    const char *what; // "structure", "meta", "config", "bench", "plan", "profile", "exclusion",
+                      // "reading", "hole", "reference", "state"
     int sweep, point, attempt; // -1: not of one
     const char *text;          // names it; borrowed for the call
 };
 
 struct store_verified {
     int version;
-    int64_t points, readings, profiles, reductions, fits; // that were looked at
+    int64_t points, readings, profiles, exclusions, reductions, fits; // that were looked at
     int64_t findings;
 };
 

@@ -60,8 +60,10 @@ static void check_positions(struct checked *c, const struct profile *p, int inde
     snprintf(where, sizeof where, "devices[%d].safe", index);
     if (*d->safe)
         check_position(c, p, where, d->safe);
-    else if (d->darks && !*p->selector.safe)
-        complain(c, d->name, "%s: profile %s does not say where it is safe, and darks need that",
+    else if (d->use == BENCH_SHUTTER && !*p->selector.safe)
+        complain(c, d->name,
+                 "%s: missing: profile %s does not say where it is safe, and a shutter goes there "
+                 "when a run pauses or ends",
                  where, p->name);
     for (int i = 0; i < c->bench->stations_count; i++) {
         const struct bench_station *s = &c->bench->stations[i];

@@ -9,6 +9,7 @@
 #include "drivers/detector.h"
 #include "drivers/device.h"
 #include "drivers/laser.h"
+#include "drivers/transport_adapter.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -41,8 +42,9 @@ void examine_tell_open(const struct examine *e, const char *who, const char *tex
 {
     struct finding f;
     char ports[600];
+    struct adapter adapters[ADAPTERS_MOST];
     const struct link l = taken_apart(text, use);
-    ports_text(e->by_id, ports, sizeof ports);
+    ports_text(e->by_id, adapters, transport_adapters(adapters), ports, sizeof ports);
     explain_open(&f, err, &l, ports);
     examine_tell(e, &f, "%s", who);
 }

@@ -90,6 +90,8 @@ static void explain_serial(struct finding *f, const struct gon_error *err, const
     } else if (strstr(err->text, "no such port")) {
         SAY(f->why, "the adapter is not plugged in, has no power, or has another name");
         SAY(f->todo, "plug it in, or mend the link in the bench file; %s", ports);
+    } else if (err->code == GON_E_INPUT && l->adapter) {
+        SAY(f->why, "which of them is meant cannot be told");
     } else {
         SAY(f->why, "the port is there and refuses");
         if (!*f->todo)

@@ -312,13 +312,15 @@ static int validate(const struct options *o, const char *file, struct fit_record
 static void say_what(const struct fit_record *record, const struct dataset *data)
 {
     const struct fit_options *o = &record->options;
-    char factor[40] = "", diffuse[40] = "";
+    char factor[40] = "", diffuse[40] = "", excluded[40] = "";
     if (o->weighting == FIT_DENSE)
         snprintf(factor, sizeof factor, ":%.10g", o->dense_g);
     if (o->diffuse != BRDF_DIFFUSE_PAPER)
         snprintf(diffuse, sizeof diffuse, ", %s diffuse", fit_diffuse_name(o->diffuse));
-    fprintf(stderr, "%s: %zu points%s, %s%s weights%s, %s, seed %llu, %.0f ms\n", data->source,
-            record->points, data->left_out ? " (others left out by the filter)" : "",
+    if (data->excluded)
+        snprintf(excluded, sizeof excluded, ", %d readings excluded", data->excluded);
+    fprintf(stderr, "%s: %zu points%s%s, %s%s weights%s, %s, seed %llu, %.0f ms\n", data->source,
+            record->points, excluded, data->left_out ? " (others left out by the filter)" : "",
             fit_weighting_name(o->weighting), factor, diffuse, fit_method_name(o->method),
             (unsigned long long)o->seed, record->result.elapsed_total_ms);
 }
@@ -357,6 +359,7 @@ static int run_fit(const struct verb *verb, int argc, char **argv)
     rc = rc < 0 ? rc : search(&data, &o, &record.options, &record.result, &err);
     rc = rc < 0 ? rc : validate(&o, file, &record, &err);
     record.points = data.count;
+    record.excluded = data.excluded;
     snprintf(record.note, sizeof record.note, "%s", data.note);
     int status = rc < 0 ? out_fail(&err) : print(&record, &data, o.json);
     dataset_clear(&data);

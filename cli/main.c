@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // gonio: finds the verb and runs it.
+#include "base/standard.h"
 #include "cli/out.h"
 #include "cli/verb.h"
 
@@ -9,10 +10,10 @@
 #include <string.h>
 
 static const struct verb *const verbs[] = {
-    &verb_plan,   &verb_run,    &verb_watch,  &verb_status,  &verb_devices, &verb_stop,
-    &verb_pause,  &verb_resume, &verb_ack,    &verb_queue,   &verb_control, &verb_list,
-    &verb_show,   &verb_verify, &verb_backup, &verb_fit,     &verb_model,   &verb_check,
-    &verb_doctor, &verb_profile,
+    &verb_plan,   &verb_run,   &verb_watch,   &verb_status,  &verb_devices,   &verb_stop,
+    &verb_laser,  &verb_pause, &verb_resume,  &verb_ack,     &verb_queue,     &verb_control,
+    &verb_list,   &verb_show,  &verb_exclude, &verb_restore, &verb_remeasure, &verb_verify,
+    &verb_backup, &verb_fit,   &verb_model,   &verb_check,   &verb_doctor,    &verb_profile,
 };
 enum { VERBS = sizeof verbs / sizeof *verbs };
 
@@ -20,7 +21,7 @@ static void print_verbs(FILE *out)
 {
     fprintf(out, "usage: gonio VERB [OPTIONS] [FILE]\n\n");
     for (int i = 0; i < VERBS; i++)
-        fprintf(out, "  %-8s %s\n", verbs[i]->name, verbs[i]->summary);
+        fprintf(out, "  %-9s %s\n", verbs[i]->name, verbs[i]->summary);
     fprintf(out, "\ngonio help VERB tells more; gonio --version; the daemon: goniod --help\n"
                  "Exit status: 0 done, 1 the instrument or the fit failed, 2 wrong arguments or\n"
                  "file, 3 no daemon, 4 refused, 130 interrupted.\n");
@@ -134,6 +135,7 @@ int verb_take(const struct verb *verb, int argc, char **argv, void *target, cons
 
 int main(int argc, char **argv)
 {
+    standard_hold();
     signal(SIGPIPE, SIG_IGN);
     curl_global_init(CURL_GLOBAL_DEFAULT);
     int status = out_finish(dispatch(argc - 1, argv + 1));

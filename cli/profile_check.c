@@ -5,6 +5,7 @@
 #include "cli/verb.h"
 #include "drivers/blocks.h"
 #include "drivers/profile_golden.h"
+#include "drivers/safing.h"
 
 #include <jansson.h>
 #include <limits.h>
@@ -30,7 +31,8 @@ static const struct verb check = {"profile check",
                                   "whether profiles are right",
                                   "Checks every setting, name, pattern and condition, plays the "
                                   "golden entries through the code that talks to instruments, and "
-                                  "prints what is in the profile.\n",
+                                  "prints what is in the profile; of a laser also whether the "
+                                  "guard can switch it off and see that.\n",
                                   rows,
                                   NULL};
 static const struct verb settings = {"profile settings",
@@ -140,6 +142,21 @@ static void print_summary(const struct profile *p, int golden)
         printf("  %s  %s\n", i ? "          " : "unverified", p->unverified[i]);
 }
 
+// Whether gonio-guard can switch this laser off and see it.
+static bool check_guard(const struct profile *p, const char *path)
+{
+    struct guard_record record;
+    struct gon_error err;
+    if (p->role != PROFILE_LASER)
+        return true;
+    if (safing_of(p, p->link, &record, &err) == 0) {
+        printf("  guard       can switch it off and see it\n");
+        return true;
+    }
+    fprintf(stderr, "%s: laser: %s\n", path, err.text);
+    return false;
+}
+
 static int check_one(const char *name)
 {
     char path[PATH_MAX];
@@ -153,7 +170,8 @@ static int check_one(const char *name)
         printf("  requests\n");
         wrong = blocks_print(p, stdout);
     }
-    const bool good = golden == p->golden_count && wrong == 0;
+    const bool guarded = check_guard(p, path);
+    const bool good = golden == p->golden_count && wrong == 0 && guarded;
     free(p);
     return good ? EXIT_OK : EXIT_INPUT;
 }

@@ -203,9 +203,10 @@ static int do_line(struct record *r, struct recorder *recorder, const char *line
     return rc;
 }
 
-// A line of standard input; false: its end, or Ctrl-C. Read without stdio, so that waiting can be
-// interrupted.
-static bool next_line(const struct interrupt *i, char *ret_line, size_t size)
+// A line of standard input; false: its end, Ctrl-C, or it cannot be read. Read without stdio, so
+// that waiting can be interrupted. *ret_used is its length, or size when it does not fit.
+static bool next_line(const struct interrupt *i, char *ret_line, size_t size, size_t *ret_used,
+                      int *status)
 {
     size_t used = 0;
     for (;;) {
@@ -215,28 +216,52 @@ static bool next_line(const struct interrupt *i, char *ret_line, size_t size)
             return false;
         if (p[1].revents)
             return false;
-        const ssize_t n = p[0].revents ? read(STDIN_FILENO, &c, 1) : -1;
+        if (!p[0].revents)
+            continue;
+        const ssize_t n = read(STDIN_FILENO, &c, 1);
+        if (n < 0 && errno != EINTR && errno != EAGAIN) {
+            out_say("profile record: standard input: %s", strerror(errno));
+            *status = worse(*status, EXIT_INPUT);
+            return false;
+        }
         if (n == 0 || (n > 0 && c == '\n')) {
-            ret_line[used] = 0;
+            ret_line[used < size ? used : size - 1] = 0;
+            *ret_used = used;
             return n > 0 || used > 0;
         }
-        if (n > 0 && c != '\r' && used + 1 < size)
+        if (n > 0 && c != '\r' && used < size)
             ret_line[used++] = c;
     }
+}
+
+// Whether a line was read as a whole: it must not be done in part.
+static bool is_whole(const char *line, size_t used, size_t size, int *status)
+{
+    const char *what = used == size           ? "longer than 511 bytes"
+                       : strlen(line) != used ? "it has a zero byte"
+                                              : NULL;
+    if (!what)
+        return true;
+    out_say("profile record: '%.40s...': %s; nothing is done for it", line, what);
+    *status = worse(*status, EXIT_INPUT);
+    return false;
 }
 
 static void run_lines(struct record *r, struct recorder *recorder, const struct interrupt *i,
                       int *status)
 {
     char line[512];
+    size_t used;
     const bool asks = isatty(STDIN_FILENO) && isatty(STDERR_FILENO);
     for (;;) {
         if (asks)
             fprintf(stderr, "%s> ", r->p->name);
-        if (!next_line(i, line, sizeof line))
+        if (!next_line(i, line, sizeof line, &used, status))
             break;
         const char *text = line + strspn(line, " \t");
-        if (*text && *text != '#' && is_over(do_line(r, recorder, text, status)))
+        if (*text == '#' || !is_whole(line, used, sizeof line, status))
+            continue;
+        if (*text && is_over(do_line(r, recorder, text, status)))
             return;
     }
     if (i->fd >= 0 && interrupt_came(i, 0))

@@ -2,6 +2,7 @@
 // status, stop, pause, ack: one question to the daemon each.
 #include "cli/remote.h"
 
+#include "campaign/catalog.h"
 #include "cli/client.h"
 #include "cli/out.h"
 #include "cli/verb.h"
@@ -64,6 +65,30 @@ json_t *remote_call_until(const struct remote_options *o, int interrupt_fd, cons
     return reply;
 }
 
+static bool same_folder(const char *path, const char *folder)
+{
+    char copy[CATALOG_PATH];
+    snprintf(copy, sizeof copy, "%s", path);
+    char *slash = strrchr(copy, '/');
+    if (slash)
+        slash[slash == copy] = 0;
+    char *ours = realpath(slash ? copy : ".", NULL), *theirs = folder ? realpath(folder, NULL) : NULL;
+    const bool same = ours && theirs && !strcmp(ours, theirs);
+    free(ours);
+    free(theirs);
+    return same;
+}
+
+int remote_has(struct client *c, const char *path, struct gon_error *err)
+{
+    json_t *status = NULL;
+    int rc = client_request(c, "GET", "/api/v1/status", NULL, &status, err);
+    if (rc == GON_OK)
+        rc = same_folder(path, json_string_value(json_object_get(status, "directory")));
+    json_decref(status);
+    return rc;
+}
+
 static const char *text_of(const json_t *o, const char *key)
 {
     const char *text = json_string_value(json_object_get(o, key));
@@ -117,7 +142,8 @@ static void print_detector(const json_t *d)
         const json_t *v = json_object_get(d, keys[i]);
         if (!json_is_number(v))
             continue;
-        printf("%s%s %.4g %s", between, names[i], json_number_value(v), i < 2 ? "V" : "s");
+        printf("%s%s %.4g %s", between, names[i], json_number_value(v),
+               i < 2 ? text_of(d, "unit") : "s");
         between = ", ";
     }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the verbs that talk to the daemon share.
 #pragma once
+#include "base/err.h"
 #include "base/options.h"
 
 #include <stdbool.h>
@@ -24,3 +25,7 @@ struct json_t *remote_call(const struct remote_options *o, const char *method, c
 struct json_t *remote_call_until(const struct remote_options *o, int interrupt_fd,
                                  const char *method, const char *path, const struct json_t *body,
                                  int *ret_status);
+
+// Whether a file lies in the daemon's folder: 1 or 0; errors as client_request.
+struct client;
+int remote_has(struct client *c, const char *path, struct gon_error *err);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// run and watch: a campaign given to the daemon, and its progress until it ends.
+// run, watch, resume, remeasure: a campaign given to the daemon, and its progress until it ends.
+#include "campaign/catalog.h"
 #include "campaign/config.h"
 #include "cli/check.h"
+#include "cli/client.h"
 #include "cli/follow.h"
 #include "cli/interrupt.h"
 #include "cli/out.h"
@@ -9,6 +11,7 @@
 #include "cli/verb.h"
 
 #include <jansson.h>
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -184,3 +187,93 @@ const struct verb verb_resume = {"resume",
                                  "gonio run does.\n",
                                  run_rows,
                                  run_resume};
+
+// --- remeasure -----------------------------------------------------------------------------------
+
+struct remeasure_options {
+    struct options run;
+    const char *dir, *reason;
+};
+
+static const struct option_row remeasure_rows[] = {
+    {"--reason", OPTION_TEXT, offsetof(struct remeasure_options, reason), "TEXT", 0, 0,
+     "why; it is kept with the readings"},
+    {"--detach", OPTION_FLAG, offsetof(struct remeasure_options, run.detach), NULL, 0, 0,
+     "start it and return"},
+    {"--dir", OPTION_TEXT, offsetof(struct remeasure_options, dir), "DIR", 0, 0,
+     "the folder of campaigns ($GONIO_DIR)"},
+    {"--socket", OPTION_TEXT, offsetof(struct remeasure_options, run.remote.socket), "PATH", 0, 0,
+     "the daemon's socket"},
+    {"--json", OPTION_FLAG, offsetof(struct remeasure_options, run.remote.json), NULL, 0, 0,
+     "print JSON"},
+    VERB_OPTIONS_END,
+};
+
+// Another folder's file has a number that stands for another campaign here.
+static int check_place(const struct remeasure_options *o, const char *path, struct gon_error *err)
+{
+    struct client *c = NULL;
+    int rc = client_new(o->run.remote.socket, &c, err);
+    rc = rc < 0 ? rc : remote_has(c, path, err);
+    client_free(c);
+    if (rc == 0 || (rc > 0 && !catalog_id(path)))
+        rc = gon_fail(err, GON_E_INPUT,
+                      "%s: no campaign of the daemon's folder; only these can be measured again",
+                      path);
+    return rc < 0 ? rc : catalog_id(path);
+}
+
+// The number of a campaign, or of its file or name.
+static int run_of(const struct remeasure_options *o, const char *text, struct gon_error *err)
+{
+    char directory[CATALOG_PATH], path[CATALOG_PATH], *end;
+    const long number = strtol(text, &end, 10);
+    if (!*end && end != text && number > 0 && number <= INT_MAX)
+        return (int)number;
+    int rc = catalog_directory(o->dir, directory, sizeof directory, err);
+    rc = rc < 0 ? rc : catalog_resolve(directory, text, path, sizeof path, err);
+    return rc < 0 ? rc : check_place(o, path, err);
+}
+
+static int run_remeasure(const struct verb *verb, int argc, char **argv)
+{
+    struct remeasure_options o = {0};
+    const char *operands[2];
+    char path[60], *end;
+    if (verb_take(verb, argc, argv, &o, operands, 2, 2) < 0)
+        return EXIT_INPUT;
+    const long sweep = strtol(operands[1], &end, 10);
+    if (*end || end == operands[1] || sweep < 1 || sweep > 1000) {
+        out_say("remeasure: '%s' is no sweep; see: gonio show %s", operands[1], operands[0]);
+        return EXIT_INPUT;
+    }
+    if (!o.reason || !o.reason[strspn(o.reason, " ")]) {
+        out_say("without a reason nobody will know later why; say it with --reason TEXT");
+        return EXIT_INPUT;
+    }
+    struct gon_error err;
+    const int run = run_of(&o, operands[0], &err);
+    if (run < 0)
+        return out_fail(&err);
+    json_t *body = json_pack("{s:s, s:i, s:s}", "do", "remeasure", "sweep", (int)sweep, "reason",
+                             o.reason); // NULL: not UTF-8
+    if (!body) {
+        out_say("the reason must be text (UTF-8)");
+        return EXIT_INPUT;
+    }
+    snprintf(path, sizeof path, "/api/v1/runs/%d/exclusions", run);
+    return submit(&o.run, path, body, &(struct wording){"is measured again", "goes on"});
+}
+
+const struct verb verb_remeasure = {
+    "remeasure",
+    "RUN SWEEP",
+    "measure a sweep of a campaign again, with the reason",
+    "What was measured of the sweep stays in the file, with the reason, and does not count any more; "
+    "every point of it gets a new attempt. Beam and dark are measured again with it, before and "
+    "after, beside the earlier ones, which the other sweeps need.\n"
+    "RUN is a number that gonio list shows, or a campaign file. It is queued as by gonio resume, also "
+    "when it was done; when it is being measured it goes on to its end first. Before it is measured, "
+    "gonio restore takes it back. Follows it as gonio run does.\n",
+    remeasure_rows,
+    run_remeasure};

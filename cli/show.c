@@ -4,6 +4,7 @@
 #include "campaign/reduce.h"
 #include "cli/fitview.h"
 #include "cli/out.h"
+#include "cli/show_exclusions.h"
 #include "cli/show_profiles.h"
 #include "cli/verb.h"
 
@@ -41,6 +42,7 @@ struct campaign {
     struct store_progress progress;
     struct plan plan;
     struct reduction reduction;
+    struct exclusions exclusions;
     bool reduced;
     char no_reduction[480];
 };
@@ -61,6 +63,7 @@ static int campaign_open(struct campaign *c, const char *dir, const char *file,
     int rc = open_file(dir, file, &c->store, err);
     rc = rc < 0 ? rc : store_read_progress(c->store, &c->progress, err);
     rc = rc < 0 ? rc : store_read_plan(c->store, &c->plan, err);
+    rc = rc < 0 ? rc : exclusions_read(c->store, &c->exclusions, err);
     if (rc < 0)
         return rc;
     catalog_read(store_path(c->store), &c->entry);
@@ -73,6 +76,7 @@ static int campaign_open(struct campaign *c, const char *dir, const char *file,
 static void campaign_close(struct campaign *c)
 {
     reduction_clear(&c->reduction);
+    exclusions_clear(&c->exclusions);
     plan_clear(&c->plan);
     store_close(c->store, NULL);
 }
@@ -114,11 +118,12 @@ static void print_readings(const struct campaign *c, const struct store_reading 
 {
     static const char *const head[] = {"kind",       "theta_i_deg", "theta_r_deg", "f_r_per_sr",
                                        "u_a_per_sr", "u_b_per_sr",  "signal_v",    "monitor_v",
-                                       "count",      "attempt",     "flags"};
-    struct table *t = table_new(11);
-    for (int i = 0; i < 11; i++) {
+                                       "count",      "attempt",     "flags",
+                                      "point",      "excluded"};
+    struct table *t = table_new(13);
+    for (int i = 0; i < 13; i++) {
         table_cell(t, "%s", head[i]);
-        if (i > 0 && i < 10)
+        if (i > 0 && i != 10 && i < 12)
             table_right(t, i);
     }
     for (; count > 0; count--, r++) {
@@ -136,6 +141,9 @@ static void print_readings(const struct campaign *c, const struct store_reading 
         table_cell(t, "%d", r->count);
         table_cell(t, "%d", r->attempt);
         table_cell(t, "%s", flags);
+        table_cell(t, "%d/%d", r->sweep, r->point);
+        const struct exclusion *x = exclusions_find(&c->exclusions, r);
+        table_cell(t, "%s%s%s", x ? x->what : "", x ? ": " : "", x ? x->reason : "");
     }
     table_print(t, stdout);
 }
@@ -151,6 +159,10 @@ static json_t *reading_json(const struct campaign *c, const struct store_reading
                           r->theta_i_udeg / 1e6, "theta_r_deg", r->theta_r_udeg / 1e6, "signal_v",
                           r->signal_v, "signal_sd_v", r->signal_sd_v, "count", r->count, "range",
                           r->range, "flags", flags, "accepted", (r->flags & STORE_REJECTING) == 0);
+    const struct exclusion *x = exclusions_find(&c->exclusions, r);
+    json_object_set_new(o, "counts", json_boolean(store_reading_counts(r)));
+    json_object_set_new(o, "excluded", store_reading_counts(r) || !x ? json_null()
+                                                                     : json_string(x->reason));
     json_object_set_new(o, "monitor_v", number(r->monitor_v));
     json_object_set_new(o, "monitor_sd_v", number(r->monitor_sd_v));
     json_object_set_new(o, "f_r_per_sr", number(p ? p->f_per_sr : (double)NAN));
@@ -208,8 +220,8 @@ static json_t *reduction_json(const struct campaign *c)
     const struct reduction *r = &c->reduction;
     if (!c->reduced)
         return json_null();
-    json_t *o = json_pack("{s:i, s:i, s:f}", "points", r->count, "left_out", r->left_out,
-                          "omega_sr", r->omega_sr);
+    json_t *o = json_pack("{s:i, s:i, s:i, s:f}", "points", r->count, "left_out", r->left_out,
+                          "excluded", r->excluded, "omega_sr", r->omega_sr);
     json_object_set_new(o, "u_scale_rel", number(r->u_scale_rel));
     json_object_set_new(o, "noise_floor_v", number(r->noise.floor_v));
     json_object_set_new(o, "noise_rel", number(r->noise.rel));
@@ -229,6 +241,8 @@ static json_t *describe(struct campaign *c)
                           "problem", e->problem, "done", c->progress.done, "total",
                           c->progress.total, "readings", (json_int_t)c->progress.readings,
                           "sweeps_done", c->progress.sweeps_done, "sweeps", c->progress.sweeps);
+    json_object_set_new(o, "excluded", json_integer(c->progress.excluded));
+    json_object_set_new(o, "exclusions", exclusions_json(&c->exclusions));
     json_object_set_new(o, "reduction", reduction_json(c));
     json_object_set_new(o, "events", events.list);
     json_object_set_new(o, "fit", fit ? fit : json_null());
@@ -247,6 +261,10 @@ static void print_description(const struct campaign *c, const json_t *o)
     printf("readings  %d of %d points, %lld with every attempt; %d of %d sweeps complete\n",
            c->progress.done, c->progress.total, (long long)c->progress.readings,
            c->progress.sweeps_done, c->progress.sweeps);
+    if (c->progress.excluded)
+        printf("out       %lld readings do not count, as somebody decided\n",
+               (long long)c->progress.excluded);
+    exclusions_print(&c->exclusions);
     if (c->reduced)
         printf("scale     u %.2g %% common to all, Omega %.4g sr\n", 100 * c->reduction.u_scale_rel,
                c->reduction.omega_sr);
@@ -311,7 +329,8 @@ const struct verb verb_show = {"show",
                                "shows. With --sweep N its readings as a\n"
                                "table: angles from the encoders, f_r with its uncorrelated (u_a) "
                                "and common (u_b) uncertainty, raw\n"
-                               "voltages, every attempt with its flags. --profiles lists the "
+                               "voltages, every attempt with its flags, its name for gonio exclude, and why it does not "
+                               "count. --profiles lists the "
                                "instruments' profiles that the file keeps, since when each was "
                                "used; --profile NAME prints one as it was read.\n",
                                rows,

@@ -102,10 +102,10 @@ static json_t *looked_json(const struct looked *l)
 {
     const bool looked_at = l->err.code == GON_OK;
     json_t *o =
-        json_pack("{s:s, s:i, s:I, s:I, s:I, s:I, s:I, s:I, s:O}", "file", l->path, "version",
+        json_pack("{s:s, s:i, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:O}", "file", l->path, "version",
                   l->seen.version, "points", (json_int_t)l->seen.points, "readings",
                   (json_int_t)l->seen.readings, "profiles", (json_int_t)l->seen.profiles,
-                  "reductions", (json_int_t)l->seen.reductions, "fits", (json_int_t)l->seen.fits,
+                  "exclusions", (json_int_t)l->seen.exclusions, "reductions", (json_int_t)l->seen.reductions, "fits", (json_int_t)l->seen.fits,
                   "found", (json_int_t)l->seen.findings, "findings", l->findings);
     json_object_set_new(o, "whole", looked_at ? json_boolean(!l->seen.findings) : json_null());
     json_object_set_new(o, "error", looked_at ? json_null() : json_string(l->err.text));
@@ -176,7 +176,7 @@ const struct verb verb_verify = {
     "FILE...",
     "whether campaign files are whole",
     "Looks at each FILE as a whole: its structure, the check value of every reading, of the plan, "
-    "the configuration, the bench and the profiles, attempts and points that are missing between "
+    "the configuration, the bench, the profiles and the exclusions, attempts and points that are missing between "
     "others, reductions and fits of what is not there. Names sweep, point and attempt of what is "
     "damaged. A file that is being measured can be looked at, too. Ends with 0 when all are whole "
     "and with 1 when one is damaged.\n",

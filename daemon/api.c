@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/api.h"
 
+#include "daemon/decision.h"
 #include "daemon/hub.h"
 #include "daemon/inventory.h"
 #include "daemon/metrics.h"
@@ -202,7 +203,9 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
     int rc = hub_submit(c->hub, (int)id, c->ticket, &err);
     if (rc < 0)
         return failed(&err);
-    return rc ? reply(201, hub_submitted(c->hub, (int)id, event_id)) : reply(HTTP_LATER, NULL);
+    if (rc)
+        hub_answer_kept(c->hub, c->ticket, 201, hub_submitted(c->hub, (int)id, event_id));
+    return reply(HTTP_LATER, NULL);
 }
 
 static struct http_reply create_run(const struct call *c, json_t *body)
@@ -324,6 +327,27 @@ static struct http_reply post_resume(const struct call *c)
     return told(c, run, &err);
 }
 
+// --- readings -----------------------------------------------------------------------------------
+
+static struct http_reply post_exclusions(const struct call *c)
+{
+    struct gon_error err;
+    struct decision *d = NULL;
+    char number[12], uid[40];
+    const size_t digits = strcspn(c->rest, "/");
+    snprintf(number, sizeof number, "%.*s", (int)digits, c->rest);
+    snprintf(uid, sizeof uid, "uid %ld", c->request->uid);
+    const bool whole = digits < sizeof number && !strcmp(c->rest + digits, "/exclusions");
+    const int run = whole ? run_number(number) : 0;
+    if (run == 0)
+        return fail(404, "there is no such run", c->request->path, "see: gonio list");
+    if (decision_parse(c->request->body, c->request->size,
+                       *c->request->name ? c->request->name : uid, &d, &err) < 0)
+        return failed(&err);
+    hub_decide(c->hub, run, d, c->ticket);
+    return reply(HTTP_LATER, NULL);
+}
+
 // --- who commands -------------------------------------------------------------------------------
 
 static struct http_reply get_control(const struct call *c)
@@ -379,23 +403,47 @@ static int arrange(const struct call *c, const char *what, int run, int place,
     return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\"; use hold, release, remove or move", what);
 }
 
+// JSON's numbers are wider than an int. One that does not fit is no run's and no place, and must
+// not become another by being cut; 0 is not given, which names the whole queue.
+static int whole(const char *name, json_int_t given, int *ret, struct gon_error *err)
+{
+    if (given < 1 || given > INT_MAX)
+        return gon_fail(err, GON_E_INPUT, "\"%s\": %" JSON_INTEGER_FORMAT " is none; from 1", name,
+                        given);
+    *ret = (int)given;
+    return GON_OK;
+}
+
+static int arrange_body(const struct call *c, const json_t *body, const char *what, json_int_t run,
+                        json_int_t place, struct gon_error *err)
+{
+    int its_run = 0, its_place = 0;
+    int rc = json_object_get(body, "run") ? whole("run", run, &its_run, err) : GON_OK;
+    if (rc == GON_OK && json_object_get(body, "place"))
+        rc = whole("place", place, &its_place, err);
+    return rc < 0 ? rc : arrange(c, what, its_run, its_place, err);
+}
+
 static struct http_reply post_queue(const struct call *c)
 {
     json_error_t e;
     struct gon_error err;
     const char *what;
-    int run = 0, place = 0;
+    json_int_t run = 0, place = 0;
     json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
-    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?i, s?i}", "do", &what, "run", &run,
+    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?I, s?I}", "do", &what, "run", &run,
                                 "place", &place) < 0) {
         json_decref(body);
         return fail(400, e.text, "the request's body",
                     "send {\"do\": \"hold\"|\"release\"|\"remove\"|\"move\", \"run\": number, "
                     "\"place\": number}");
     }
-    const int rc = arrange(c, what, run, place, &err);
+    const int rc = arrange_body(c, body, what, run, place, &err);
     json_decref(body);
-    return rc < 0 ? failed(&err) : get_queue(c);
+    if (rc < 0)
+        return failed(&err);
+    hub_answer_kept(c->hub, c->ticket, 200, view_text(view_queue(hub_queue(c->hub))));
+    return reply(HTTP_LATER, NULL);
 }
 
 // --- routes -------------------------------------------------------------------------------------
@@ -405,28 +453,33 @@ static const struct route {
     struct http_reply (*handle)(const struct call *c);
     const char *allow; // all methods of that path
     bool controlled;   // only for who has control, while somebody has
+    const char *end;   // of the path, after its rest; NULL: any
 } routes[] = {
-    {"GET", "/api/v1/status", get_status, "GET", false},
-    {"GET", "/api/v1/devices", get_devices, "GET", false},
-    {"GET", "/metrics", get_metrics, "GET", false},
-    {"GET", "/api/v1/runs", get_runs, "GET, POST", false},
-    {"POST", "/api/v1/runs", post_runs, "GET, POST", true},
-    {"GET", "/api/v1/runs/", get_run, "GET", false},
-    {"GET", "/api/v1/queue", get_queue, "GET, POST", false},
-    {"POST", "/api/v1/queue", post_queue, "GET, POST", true},
-    {"GET", "/api/v1/control", get_control, "GET, POST", false},
-    {"POST", "/api/v1/control", post_control, "GET, POST", false},
-    {"GET", "/api/v1/events", get_events, "GET", false},
-    {"POST", HTTP_STOP_PATH, post_stop, "POST", false},
-    {"POST", "/api/v1/pause", post_pause, "POST", true},
-    {"POST", "/api/v1/resume", post_resume, "POST", true},
-    {"POST", "/api/v1/ack", post_ack, "POST", true},
+    {"GET", "/api/v1/status", get_status, "GET", false, NULL},
+    {"GET", "/api/v1/devices", get_devices, "GET", false, NULL},
+    {"GET", "/metrics", get_metrics, "GET", false, NULL},
+    {"GET", "/api/v1/runs", get_runs, "GET, POST", false, NULL},
+    {"POST", "/api/v1/runs", post_runs, "GET, POST", true, NULL},
+    {"GET", "/api/v1/runs/", get_run, "GET", false, NULL},
+    {"POST", "/api/v1/runs/", post_exclusions, "POST", true, "/exclusions"},
+    {"GET", "/api/v1/queue", get_queue, "GET, POST", false, NULL},
+    {"POST", "/api/v1/queue", post_queue, "GET, POST", true, NULL},
+    {"GET", "/api/v1/control", get_control, "GET, POST", false, NULL},
+    {"POST", "/api/v1/control", post_control, "GET, POST", false, NULL},
+    {"GET", "/api/v1/events", get_events, "GET", false, NULL},
+    {"POST", HTTP_STOP_PATH, post_stop, "POST", false, NULL},
+    {"POST", "/api/v1/pause", post_pause, "POST", true, NULL},
+    {"POST", "/api/v1/resume", post_resume, "POST", true, NULL},
+    {"POST", "/api/v1/ack", post_ack, "POST", true, NULL},
 };
 
 static const char *rest_of(const struct route *r, const char *path)
 {
     size_t n = strlen(r->path);
     bool prefix = r->path[n - 1] == '/';
+    const size_t size = strlen(path), end = r->end ? strlen(r->end) : 0;
+    if (size < n + end || (end && strcmp(path + size - end, r->end)))
+        return NULL;
     if (prefix ? strncmp(path, r->path, n) : strcmp(path, r->path))
         return NULL;
     return path + n;

@@ -102,6 +102,15 @@ void engine_enter(struct engine *e, enum run_state state, const char *text)
 
 // --- storing ----------------------------------------------------------------------------------
 
+// The light is looked after meanwhile: an off that was not confirmed is repeated.
+static void wait_to_store(struct engine *e)
+{
+    const int64_t until_ns = clk_now_ns(e->ports->clk) + STORE_RETRY_NS;
+    while (clk_now_ns(e->ports->clk) < until_ns && engine_nap(e, CLK_MS(100)) == 0)
+        instrument_reconnect(e->in);
+    instrument_tend(e->in);
+}
+
 // The row is offered until it is accepted: nothing that was measured is lost, and nothing goes on
 // before.
 static int store(struct engine *e, const struct store_reading *row)
@@ -116,7 +125,7 @@ static int store(struct engine *e, const struct store_reading *row)
     engine_make_safe(e);
     engine_enter_pause(e, text);
     while (rc == GON_E_STORE) {
-        instrument_wait(e->in, clk_now_ns(e->ports->clk) + STORE_RETRY_NS, e->ports->cancel);
+        wait_to_store(e);
         rc = e->ports->store_reading(e->ports->ctx, row, &e->why);
         if (rc == GON_E_STORE && cancel_requested(e->ports->cancel))
             return engine_canceled(e);
@@ -236,7 +245,8 @@ static int prepare(struct engine *e)
     e->ready = rc >= 0;
     e->pace_ns = 0;
     instrument_permit(e->in, e->ready);
-    e->acquire = (struct acquire){.range = -1};
+    e->acquire =
+        (struct acquire){.range = -1, .set_up = true}; // whoever was there may have turned it
     return rc;
 }
 
@@ -316,8 +326,14 @@ static int measure(struct engine *e, const struct travel_pose *at)
             rc = engine_confirm_devices(e, &r);
         if (rc < 0)
             return rc;
+        if (e->lit && (rc = engine_heed_guard(e)) < 0)
+            return rc; // it went dark meanwhile: no reading
         e->attempt++;
+        const int sure = engine_verify(e, at, &r);
+        const struct gon_error why = e->why;
         const struct store_reading row = row_of(e, &r, at);
+        if (r.accepted)
+            engine_freshen(e); // before a pause of the store, which is a gap
         rc = store(e, &row);
         if (rc < 0)
             return rc;
@@ -330,6 +346,10 @@ static int measure(struct engine *e, const struct travel_pose *at)
         if (r.monitor_failed)
             engine_say(e, ENGINE_LOG, "notice",
                        "monitor: beyond its range or unsettled; the reading is discarded");
+        if (sure < 0) {
+            e->why = why;
+            return sure;
+        }
         rc = e->ready ? engine_seek_device(e) : 0;
         if (rc < 0)
             return rc;
@@ -489,11 +509,12 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         e.monitor_dark_v = e.opening.dark_monitor_v;
         e.last_utc_ms = e.opening.last_utc_ms;
     }
-    e.gap = engine_has_beam(&e);
+    engine_begin_gap(&e);
     engine_count_attempts(&e);
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
     instrument_obey(instrument, ports->cancel);
+    instrument_permit(instrument, false); // what the guard did before is past
     instrument_heed(instrument, engine_heed, &e);
     instrument_release(instrument); // whoever starts it has seen to the bench
     engine_enter(&e, RUN_PREPARING, NULL);

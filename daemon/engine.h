@@ -15,8 +15,9 @@
 // point in progress; an interlock, a device's fault or a refused command pauses until somebody
 // resumes. So does a
 // suspender of the bench (daemon/suspend.h), also in the middle of a point: that attempt is given
-// up, and nothing of it is stored. After a pause and when a campaign goes on, the opening references
-// are measured again before the next point on the sample (campaign/reduce.h). Each reading is acknowledged by the store before the next point begins.
+// up, and nothing of it is stored. After a pause and when a campaign goes on, the opening
+// references are measured again before the next point on the sample (campaign/reduce.h). Each
+// reading is acknowledged by the store before the next point begins.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_suspend.c (suspenders
-// and interruptions), engine_reference.c (references after
-// a gap), engine_steps.c (what a person does), engine_light.c (the laser's part), engine_elements.c (the elements of polarisation) and engine_devices.c (shutters,
-// filter wheels and the like) share; nobody else includes it.
+// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_suspend.c
+// (suspenders and interruptions), engine_reference.c (references after a gap), engine_steps.c (what
+// a person does), engine_light.c (the laser's part), engine_elements.c (the elements of
+// polarisation), engine_devices.c (shutters, filter wheels and the like) and engine_verify.c
+// (whether a reading is one) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
 
 struct plan_point;
+struct travel_pose;
 
 enum {
     ENGINE_AGAIN = 1,                 // not done, but nothing is wrong
@@ -32,10 +34,10 @@ struct engine {
     char asks[160];           // of whoever is there; "": nothing
     char station[BENCH_NAME]; // where the bench was made ready for; "": the sample
     int stepped;              // the point before which a sweep's step was done; -1: none
-    bool asking; // somebody asked for a pause, as asked says
+    bool asking;              // somebody asked for a pause, as asked says
     struct engine_asked asked;
-    bool heeding;              // waits may be interrupted: a point is in progress
-    bool suspended;            // by a suspender, as why says
+    bool heeding;               // waits may be interrupted: a point is in progress
+    bool suspended;             // by a suspender, as why says
     struct gon_error interrupt; // why a wait of this point was; code 0: none was
     int tries;   // of a suspender that only light shows, since the last accepted reading
     int returns; // pauses that ended by themselves since the last accepted reading
@@ -46,11 +48,13 @@ struct engine {
     enum instrument_part strayed; // found elsewhere after the last reading; PART_COUNT: none
 
     double omega_sr, monitor_dark_v, monitor_lit_v;
-    struct engine_opening opening; // the newest
-    bool gap;                      // the light was off since: they have to be measured again
-    bool referring;                // which is being done
-    double gap_s;                  // how long it was
-    struct engine_opening before;  // the gap
+    struct engine_opening opening;   // the newest
+    bool gap;                        // the light was off since: they have to be measured again
+    bool referring;                  // which is being done
+    unsigned fresh;                  // opening points measured since, a bit each
+    int64_t gap_utc_ms;              // of the last reading before
+    double gap_s;                    // how long it was
+    struct engine_opening before;    // the gap
     int attempts[ENGINE_REFERENCES]; // of the opening points
     int64_t last_utc_ms;             // of the newest reading
     int64_t pace_ns; // when the sample's first point since the preparation was done; 0: none yet
@@ -73,7 +77,10 @@ int engine_do_point(struct engine *e); // or ENGINE_AGAIN
 bool engine_has_beam(const struct engine *e);
 void engine_count_attempts(struct engine *e); // of the opening points, at the beginning
 void engine_keep_attempt(struct engine *e);   // of the point that is done
-// The opening references again, where there was a gap and the sample is next.
+void engine_begin_gap(struct engine *e);      // the light goes off, or nobody knows
+void engine_freshen(struct engine *e);        // there is a good reading of the point
+// The opening references again, where there was a gap and the sample is next; not those that were
+// measured since.
 int engine_refer(struct engine *e);
 
 // --- engine_steps.c ---
@@ -118,9 +125,16 @@ int engine_seek_device(struct engine *e);
 bool engine_shutter_darkens(const struct engine *e);
 int engine_shut(struct engine *e);
 
+// --- engine_verify.c ---
+// At the end of a reading: the axes stand where they stood, and a dark was dark. Otherwise the
+// reading is flagged, not accepted, and this is the error of the run.
+int engine_verify(struct engine *e, const struct travel_pose *at, struct acquire_reading *r);
+
 // --- engine_light.c ---
 // Darks without light, everything else with it, warmed up and steady.
 int engine_light_for(struct engine *e);
+// The guard did not switch the laser off by itself, and is there.
+int engine_heed_guard(struct engine *e);
 // The laser was on and should be: one short question, and only when it is due; or all there is to
 // know.
 int engine_watch_laser(struct engine *e);

@@ -4,6 +4,7 @@
 #include "campaign/bench.h"
 #include "campaign/plan.h"
 #include "daemon/instrument_devices.h"
+#include "daemon/travel.h"
 
 #include <math.h>
 
@@ -27,10 +28,20 @@ static int laser_trouble(struct engine *e, const struct laser_status *s)
     return 0;
 }
 
+int engine_heed_guard(struct engine *e)
+{
+    struct gon_error why;
+    if (instrument_alarm(e->in, &why) == 0)
+        return 0;
+    return gon_fail(&e->why, why.code, "%.400s; look at it, then: gonio resume", why.text);
+}
+
 int engine_check_laser(struct engine *e)
 {
     struct laser_status s;
-    int rc = instrument_laser(e->in, &s, &e->why);
+    int rc = engine_heed_guard(e);
+    if (rc >= 0)
+        rc = instrument_laser(e->in, &s, &e->why);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     if (rc >= 0)
         rc = laser_trouble(e, &s);
@@ -44,11 +55,20 @@ int engine_check_laser(struct engine *e)
 int engine_watch_laser(struct engine *e)
 {
     bool on;
+    if (e->lit && engine_heed_guard(e) < 0)
+        return e->why.code;
     if (!e->lit || clk_now_ns(e->ports->clk) < e->laser_look_ns)
         return 0;
     int rc = instrument_light(e->in, &on, &e->why);
     e->laser_look_ns = clk_now_ns(e->ports->clk) + LASER_LOOK_NS;
     return rc < 0 || on ? rc : engine_check_laser(e);
+}
+
+// Nothing moves while it warms up, but an axis in alarm must not stay in the light until then.
+static int check_axes(struct engine *e)
+{
+    const struct travel_pose anywhere = travel_stay();
+    return travel_still(e->in, &anywhere, &e->why);
 }
 
 static int wait_until_emitting(struct engine *e)
@@ -64,6 +84,9 @@ static int wait_until_emitting(struct engine *e)
             return rc;
         if (s.state == LASER_EMITTING && s.emission)
             return 0;
+        rc = check_axes(e);
+        if (rc < 0)
+            return rc;
         const double s_since = (double)(clk_now_ns(e->ports->clk) - start_ns) * 1e-9;
         if ((s.state == LASER_OFF && s_since > OFF_AT_FIRST_S) || s_since > most_s)
             return gon_fail(
@@ -110,6 +133,11 @@ static int wait_until_steady(struct engine *e)
         e->monitor_lit_v = now_v;
         if (change < 0.5 * STEADY_REL)
             break;
+        if (clk_now_ns(e->ports->clk) > until_ns && now_v == dark_v)
+            return gon_fail(&e->why, GON_E_DEVICE,
+                            "laser: says it emits, but the monitor reads %.4g %s as in the dark; "
+                            "look at laser, shutter and monitor, then: gonio resume",
+                            now_v, unit);
         if (clk_now_ns(e->ports->clk) > until_ns)
             return gon_fail(
                 &e->why, GON_E_DEVICE,
@@ -133,8 +161,10 @@ static int warm_up(struct engine *e)
         if (engine_pause_asked(e))
             return engine_operator_paused(e);
         rc = engine_nap(e, left_ns < CLK_MS(100) ? left_ns : CLK_MS(100));
-        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns)
+        if (rc >= 0 && clk_now_ns(e->ports->clk) >= e->laser_look_ns) {
             rc = engine_check_laser(e);
+            rc = rc < 0 ? rc : check_axes(e);
+        }
     }
     if (rc >= 0)
         rc = instrument_fit_monitor(e->in, &e->why);

@@ -32,7 +32,7 @@ void engine_make_safe(struct engine *e)
     struct gon_error err;
     const bool was_on = instrument_light_left(e->in) == SAFETY_LIGHT_MAYBE;
     e->ready = e->lit = e->dark = e->heeding = false;
-    e->gap = e->gap || engine_has_beam(e);
+    engine_begin_gap(e);
     instrument_steady(e->in, false);
     instrument_permit(e->in, false);
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
@@ -134,14 +134,29 @@ int engine_wait_for_operator(struct engine *e)
     return 0;
 }
 
+// Another device answers in a lost one's place: waiting alone does not help, so that is said.
+static void tell_refused(struct engine *e, char told[sizeof((struct part_state *)0)->problem])
+{
+    struct instrument_snapshot s;
+    instrument_snapshot(e->in, &s);
+    for (int i = next_lost(&s, 0); i < PART_COUNT; i = next_lost(&s, i + 1))
+        if (s.part[i].refused && strcmp(told, s.part[i].problem) != 0) {
+            strcpy(told, s.part[i].problem);
+            engine_enter_pause(e, told);
+            return;
+        }
+}
+
 // Until every device is back, or an operator took the pause over.
 static int wait_for_devices(struct engine *e)
 {
+    char told[sizeof((struct part_state *)0)->problem] = "";
     do {
+        tell_refused(e, told);
         if (engine_pause_asked(e))
             return engine_take_over(e);
         instrument_look_around(e->in); // a door that opens meanwhile is not forgotten
-        (void)resume_asked(e); // it goes on by itself anyway
+        (void)resume_asked(e);         // it goes on by itself anyway
         if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;
     } while (instrument_reconnect(e->in) > 0);
@@ -152,10 +167,12 @@ static int wait_for_devices(struct engine *e)
 int engine_pause_run(struct engine *e)
 {
     const enum run_state before = e->state;
-    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     char text[600];
-    const bool suspended = e->suspended;
     int rc;
+    instrument_breathe(e->in);
+    // What the guard did is the reason, whatever followed from it: somebody has to look.
+    const bool suspended = engine_heed_guard(e) == 0 && e->suspended;
+    const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     engine_make_safe(e);
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
@@ -173,6 +190,7 @@ int engine_pause_run(struct engine *e)
         rc = engine_wait_for_operator(e);
         e->returns = 0;
     }
+    instrument_permit(e->in, false);               // what the guard did meanwhile is past
     const bool returned = by_itself && !e->wanted; // and nobody took the pause over
     if (rc >= 0 && !returned && (!suspended || e->wanted))
         instrument_release(e->in); // somebody resumed it

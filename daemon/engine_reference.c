@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // After a gap (a pause, a stop) the light has been off: the opening references are measured again,
-// as further accepted readings of the same points, before the sample goes on. The reduction
+// as further accepted readings of the same points, before the sample goes on. Those that are open
+// anyway (a sweep is measured again) are measured once. The reduction
 // (campaign/reduce.h) then takes those before and behind each reading.
 #include "daemon/engine_inside.h"
 
@@ -39,6 +40,39 @@ void engine_keep_attempt(struct engine *e)
     const int i = (int)(e->point - e->plan->points);
     if (i < opening_points(e->plan))
         e->attempts[i] = e->attempt;
+}
+
+// --- gap and references --------------------------------------------------------------------------
+
+void engine_begin_gap(struct engine *e)
+{
+    e->fresh = 0;
+    if (e->gap || !engine_has_beam(e))
+        return;
+    e->gap = true;
+    e->gap_utc_ms = e->last_utc_ms;
+}
+
+void engine_freshen(struct engine *e)
+{
+    const int i = (int)(e->point - e->plan->points);
+    if (i < opening_points(e->plan))
+        e->fresh |= 1u << i;
+}
+
+static bool all_fresh(const struct engine *e)
+{
+    return e->fresh == (1u << opening_points(e->plan)) - 1;
+}
+
+// What the references were before those that are measured again; NAN: not of these.
+static struct engine_opening former(const struct engine *e)
+{
+    struct engine_opening before = e->opening;
+    for (int i = 0; i < opening_points(e->plan); i++)
+        if (e->fresh & 1u << i && e->plan->points[i].kind == PLAN_BEAM)
+            before.beam_signal_v[e->plan->points[i].pol_in] = (double)NAN;
+    return before;
 }
 
 // --- what has changed ----------------------------------------------------------------------------
@@ -80,17 +114,20 @@ static int measure_one(struct engine *e, int index)
     return rc;
 }
 
-static double since_last_s(const struct engine *e)
+static double gap_s(const struct engine *e)
 {
     const int64_t now_ms = clk_utc_ns(e->ports->clk) / 1000000;
-    return fmax(0, (double)(now_ms - e->last_utc_ms) * 1e-3);
+    return fmax(0, (double)(now_ms - e->gap_utc_ms) * 1e-3);
 }
 
-static int measure_all(struct engine *e)
+// A pause of the store meanwhile is a gap, too: then once more.
+static int measure_stale(struct engine *e)
 {
     int rc = 0;
-    for (int i = 0; i < opening_points(e->plan) && rc >= 0; i++)
-        rc = measure_one(e, i);
+    while (rc >= 0 && !all_fresh(e))
+        for (int i = 0; i < opening_points(e->plan) && rc >= 0; i++)
+            if (!(e->fresh & 1u << i))
+                rc = measure_one(e, i);
     return rc;
 }
 
@@ -100,13 +137,17 @@ int engine_refer(struct engine *e)
     const int attempt = e->attempt;
     if (!e->gap || asked->kind != PLAN_SAMPLE)
         return 0;
+    if (all_fresh(e)) {
+        e->gap = e->referring = false;
+        return 0;
+    }
     if (!e->referring) { // not of an earlier try
-        e->before = e->opening;
-        e->gap_s = since_last_s(e);
+        e->before = former(e);
+        e->gap_s = gap_s(e);
     }
     e->referring = true;
     engine_enter(e, RUN_PREPARING, "dark and beam again, after a gap");
-    int rc = measure_all(e);
+    int rc = measure_stale(e);
     e->point = asked;
     e->attempt = attempt;
     if (rc < 0)

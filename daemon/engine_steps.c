@@ -13,8 +13,10 @@
 static void make_safe(struct engine *e)
 {
     const bool gap = e->gap;
+    const unsigned fresh = e->fresh;
     engine_make_safe(e);
     e->gap = gap;
+    e->fresh = fresh;
 }
 
 static void say(struct engine *e, double late_s)
@@ -40,6 +42,7 @@ static int wait_for_it(struct engine *e, char *ret_by, size_t size)
         if (engine_pause_asked(e)) {
             *e->asks = 0;
             const int rc = engine_take_over(e);
+            instrument_permit(e->in, false); // what the guard did meanwhile is past
             return rc < 0 ? rc : ENGINE_AGAIN;
         }
         if (!late && limit_s > 0 && waited_s >= limit_s) {

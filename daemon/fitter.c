@@ -94,6 +94,7 @@ static int run_fit(struct fitter *f, const struct campaign_config *config,
     o->record.trace = o->trace;
     o->record.options = options;
     o->record.points = d.count;
+    o->record.excluded = data->excluded;
     snprintf(o->record.note, sizeof o->record.note, "%s", data->note);
     if (stop == FIT_E_CANCELED)
         return gon_fail(err, GON_E_CANCELED, "fit: canceled");

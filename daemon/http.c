@@ -240,6 +240,14 @@ static bool is_printable(const char *text)
     return true;
 }
 
+// What is said of a name is JSON, which is UTF-8; one that is none could not even be shown.
+static bool is_utf8(const char *text)
+{
+    json_t *o = json_string(text);
+    json_decref(o);
+    return o != NULL;
+}
+
 // False: it is there, and is no name.
 static bool name_of(struct MHD_Connection *c, char ret_name[HTTP_NAME])
 {
@@ -252,7 +260,8 @@ static bool name_of(struct MHD_Connection *c, char ret_name[HTTP_NAME])
         return false;
     memcpy(decoded, text, strlen(text) + 1);
     const size_t size = MHD_http_unescape(decoded);
-    if (size >= HTTP_NAME || size != strlen(decoded) || !is_printable(decoded))
+    if (size >= HTTP_NAME || size != strlen(decoded) || !is_printable(decoded) ||
+        !is_utf8(decoded))
         return false;
     memcpy(ret_name, decoded, size + 1);
     return true;
@@ -269,9 +278,11 @@ static struct http_reply handle(struct exchange *x, const char *method, const ch
     char name[HTTP_NAME];
     peer_of(x->connection, &r);
     r.name = name;
-    if (!name_of(x->connection, name))
+    // Who stops needs no name: a stop is not refused for a wrong one.
+    if (!name_of(x->connection, name) && strcmp(path, HTTP_STOP_PATH))
         return refuse(400, "the header " HTTP_NAME_HEADER " is no name",
-                      "send at most 64 printable bytes, percent-encoded");
+                      "send at most 64 printable bytes of UTF-8, percent-encoded; gonio takes "
+                      "GONIO_NAME");
     log_say(x->http->log, strcmp(method, "GET") ? LOG_INFO : LOG_DEBUG, "http",
             "%s %s from pid %ld uid %ld", method, path, r.pid, r.uid);
     return x->http->ports.request(x->http->ports.ctx, &r, x->ticket);

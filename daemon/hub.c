@@ -7,6 +7,7 @@
 #include "campaign/bench.h"
 #include "campaign/state.h"
 #include "daemon/api.h"
+#include "daemon/decision.h"
 #include "daemon/fitter.h"
 #include "daemon/loop.h"
 #include "daemon/material.h"
@@ -31,8 +32,8 @@ struct hub {
     struct http *http;
     struct queue *queue;
     struct control control;
-    struct messenger *messenger;           // NULL: nobody is told
-    const char *notify[BENCH_NOTIFY + 1];  // its command
+    struct messenger *messenger;          // NULL: nobody is told
+    const char *notify[BENCH_NOTIFY + 1]; // its command
     struct storer *storer;
     struct runner *runner;
     struct fitter *fitter;
@@ -70,7 +71,8 @@ static void answer_stopped(struct hub *h, int status, json_t *o)
 {
     json_object_set_new(o, "put_back", h->put_back ? h->put_back : json_array());
     h->put_back = NULL;
-    json_object_set_new(o, "laser_off", json_boolean(h->snapshot && instrument_is_dark(h->snapshot)));
+    json_object_set_new(o, "laser_off",
+                        json_boolean(h->snapshot && instrument_is_dark(h->snapshot)));
     char *body = view_text(o);
     answer_stops(h, status, body);
     free(body);
@@ -100,8 +102,8 @@ static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
     const bool paused = run->state == RUN_PAUSED;
-    const bool bad = run->state == RUN_FAILED ||
-                     (paused && (!run->wanted || run->light != SAFETY_LIGHT_OFF));
+    const bool bad =
+        run->state == RUN_FAILED || (paused && (!run->wanted || run->light != SAFETY_LIGHT_OFF));
     log_say(h->options.log, bad ? LOG_WARN : LOG_NOTICE, "run", "%d %s%s%s", run->id,
             run_state_name(run->state), *run->text ? ": " : "", run->text);
     if (bad)
@@ -252,6 +254,21 @@ char *hub_submitted(const struct hub *h, int run, uint64_t event_id)
     return view_text(o);
 }
 
+void hub_answer_kept(struct hub *h, uint64_t ticket, int status, char *body)
+{
+    struct note *n = note_new(NOTE_KEPT);
+    n->ticket = ticket;
+    n->run = status;
+    n->text = body;
+    note_post(h->store_box, n);
+}
+
+static void kept(struct hub *h, struct note *n)
+{
+    http_answer(h->http, n->ticket, n->run, n->text);
+    n->text = NULL; // is the answer's now
+}
+
 void hub_status(const struct hub *h, struct hub_status *ret_status)
 {
     const int64_t now_ns = clk_now_ns(clk_system());
@@ -335,6 +352,17 @@ void hub_find(struct hub *h, int run, uint64_t ticket)
     note_post(h->store_box, n);
 }
 
+void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t ticket)
+{
+    struct note *n = note_new(NOTE_DECIDE);
+    n->ticket = ticket;
+    n->run = run;
+    n->last = decision->verb == DECISION_REMEASURE;
+    n->thing = decision;
+    n->drop = decision_free;
+    note_post(h->store_box, n);
+}
+
 static void note_waiting(struct hub *h)
 {
     const struct run *run, *active = queue_active(h->queue);
@@ -403,8 +431,9 @@ int hub_resume(struct hub *h, struct gon_error *err)
     }
     const struct run *run = queue_active(h->queue);
     if (run && *run->asks)
-        return gon_fail(err, GON_E_REFUSED, "run %d waits for a person: %s; when that is done: gonio ack",
-                        run->id, run->asks);
+        return gon_fail(err, GON_E_REFUSED,
+                        "run %d waits for a person: %s; when that is done: gonio ack", run->id,
+                        run->asks);
     return to_active(h, note_new(NOTE_RESUME), 1u << RUN_PAUSED, err);
 }
 
@@ -433,10 +462,9 @@ int hub_control_take(struct hub *h, const char *name, const char *reason, const 
              *before && strcmp(before, name) ? " from " : "",
              *before && strcmp(before, name) ? before : "", reason && *reason ? ": " : "",
              reason ? reason : "");
-    return control_changed(h,
-                           control_take(&h->control, name, reason, from,
-                                        clk_utc_ns(clk_system()) / 1000000, err),
-                           what);
+    return control_changed(
+        h, control_take(&h->control, name, reason, from, clk_utc_ns(clk_system()) / 1000000, err),
+        what);
 }
 
 int hub_control_release(struct hub *h, const char *name, struct gon_error *err)
@@ -489,13 +517,47 @@ static void known(struct hub *h, struct note *n)
     struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
     int rc = run ? submit_known(h, run->id, &err) : (int)err.code;
     if (rc == 0) {
-        http_answer(h->http, n->ticket, 201, hub_submitted(h, run->id, event_id));
+        hub_answer_kept(h, n->ticket, 201, hub_submitted(h, run->id, event_id));
     } else {
         if (rc == GON_E_STORE)
             snprintf(h->last_error, sizeof h->last_error, "%s", err.text);
         http_answer(h->http, n->ticket, api_status(rc),
                     n->text ? api_complaints(n->text) : api_error(rc, err.text));
     }
+}
+
+static void answer_failed(struct hub *h, uint64_t ticket, const struct gon_error *err)
+{
+    http_answer(h->http, ticket, api_status(err->code), api_error(err->code, err->text));
+}
+
+// One that has the bench or waits is measured again by itself.
+static int submit_again(struct hub *h, int run, struct gon_error *err)
+{
+    struct queue_entry entries[MOST_KEPT];
+    const size_t count = queue_entries(h->queue, entries, MOST_KEPT);
+    for (size_t i = 0; i < count; i++)
+        if (entries[i].run->id == run)
+            return GON_OK;
+    return queue_submit(h->queue, run, err);
+}
+
+static void decided(struct hub *h, const struct note *n)
+{
+    struct gon_error err = n->err;
+    const uint64_t event_id = hub_event_id(h);
+    const struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
+    if (!run || (n->last && submit_again(h, n->run, &err) < 0)) {
+        answer_failed(h, n->ticket, &err);
+        return;
+    }
+    log_say(h->options.log, LOG_NOTICE, "run", "%d: decided about %d readings, see: gonio show %d",
+            n->run, n->count, n->run);
+    char *text = hub_submitted(h, n->run, event_id);
+    json_t *o = json_loads(text, 0, NULL);
+    json_object_set_new(o, "readings", json_integer(n->count));
+    http_answer(h->http, n->ticket, n->last ? 201 : 200, view_text(o));
+    free(text);
 }
 
 static void halted(struct hub *h, const struct note *n)
@@ -564,9 +626,16 @@ static void take(struct hub *h, struct note *n)
     case NOTE_UNKEPT: unkept(h, n); break;
     case NOTE_KNOWN: known(h, n); break;
     case NOTE_FOUND: found(h, n); break;
+    case NOTE_KEPT: kept(h, n); break;
     case NOTE_OPENED: queue_opened(h->queue, n->run, note_steal(n), &n->err); break;
     case NOTE_FITTED: fitted(h, n); break;
-    case NOTE_CLOSED: queue_closed(h->queue, n->run, n->err.code ? &n->err : NULL); break;
+    case NOTE_CLOSED:
+        if (n->last && !n->err.code)
+            queue_reopened(h->queue, n->run);
+        else
+            queue_closed(h->queue, n->run, n->err.code ? &n->err : NULL);
+        break;
+    case NOTE_DECIDED: decided(h, n); break;
     case NOTE_HAPPENED: happened(h, n); break;
     case NOTE_FIT_ASKED: queue_fit_asked(h->queue, n->run, n->sweep, n->last); break;
     case NOTE_ENDED: engine_ended(h, n); break;
@@ -611,8 +680,8 @@ static int start_workers(struct hub *h, struct gon_error *err)
                              h->options.directory, h->store_box,        h->box,
                              h->run_box,           h->options.profiles, h->options.profiles_count};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
-    struct runner_links r = {h->options.bench, h->cancel, h->options.directory,
-                             h->run_box,       h->box,    h->store_box};
+    struct runner_links r = {h->options.bench, h->options.guard, h->cancel,   h->options.directory,
+                             h->run_box,       h->box,           h->store_box};
     int rc = storer_start(&s, &h->storer, err);
     rc = rc < 0 ? rc : fitter_start(&f, &h->fitter, err);
     return rc < 0 ? rc : runner_start(&r, &h->runner, err);
@@ -631,8 +700,8 @@ static int start_messenger(struct hub *h, struct gon_error *err)
 
 static int build(struct hub *h, int listen_fd, struct gon_error *err)
 {
-    struct queue_ports q = {h,          open_port,   start_port, fit_port,
-                            close_port, cancel_port, rearm_port, changed, keep_port};
+    struct queue_ports q = {h,           open_port,  start_port, fit_port, close_port,
+                            cancel_port, rearm_port, changed,    keep_port};
     struct http_ports p = {h, api_request};
     // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be
     // late.

@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 struct bench_config;
+struct guard_host;
 struct hub;
 struct log;
 struct store_profile;
@@ -20,6 +21,7 @@ struct loop;
 
 struct hub_options {
     const struct bench_config *bench; // borrowed for the hub's life
+    const struct guard_host *guard; // borrowed: the process that holds the laser's port
     const char *bench_text; // as read, for the campaign files
     const struct store_profile *profiles; // likewise, borrowed
     int profiles_count;
@@ -61,6 +63,10 @@ void hub_create(struct hub *h, const char *config, const char *name, uint64_t ti
 int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err);
 void hub_submit_path(struct hub *h, const char *path, uint64_t ticket);
 void hub_find(struct hub *h, int run, uint64_t ticket); // one that the queue does not know
+// What becomes of readings of a run; takes the decision. The ticket is answered when it is written,
+// and the run queued when a sweep is to be measured again.
+struct decision;
+void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t ticket);
 // Stops in any case; false: 32 tickets wait for the end of a stop already, and this one will not be
 // answered.
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket);
@@ -84,4 +90,6 @@ int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err);
 
 uint64_t hub_event_id(const struct hub *h); // of the newest event
 // A run with the id of the event after which all of it can be followed, as JSON text.
+// Answers once what the queue is now is on the disk; body is taken over.
+void hub_answer_kept(struct hub *h, uint64_t ticket, int status, char *body);
 char *hub_submitted(const struct hub *h, int run, uint64_t event_id);

@@ -5,8 +5,11 @@
 #include "daemon/instrument_inside.h"
 #include "daemon/instrument_suspend.h"
 #include "drivers/bus.h"
+#include "drivers/by_profile.h"
 #include "drivers/device.h"
+#include "drivers/identity.h"
 #include "drivers/profile.h"
+#include "drivers/safing.h"
 
 #include <assert.h>
 #include <math.h>
@@ -107,6 +110,8 @@ int instrument_need(struct instrument *in, enum instrument_part part, struct gon
 {
     assert(in->part[part].link != PART_ABSENT);
     in->talking = (int)part;
+    if (in->part[part].refused)
+        return gon_fail(err, GON_E_GONE, "%s", in->part[part].problem);
     if (instrument_is_there(in, part))
         return 0;
     return instrument_note(
@@ -171,20 +176,65 @@ static int connect_axis(struct instrument *in, enum instrument_part part, struct
     return m->axis->ops->stop(m->axis, err);
 }
 
-static int connect_laser(struct instrument *in, struct gon_error *err)
+// Its port is opened by the guard, to which its record goes first.
+static int open_guarded(struct instrument *in, struct laser **ret_laser, struct gon_error *err)
 {
-    struct part_state *p = &in->part[PART_LASER];
+    const struct part_state *p = &in->part[PART_LASER];
+    struct guard_record record;
+    struct transport *transport;
+    int rc =
+        in->laser_profile ? 0 : profile_open(p->driver, in->bench->folder, &in->laser_profile, err);
+    rc = rc < 0 ? rc : safing_of(in->laser_profile, p->address, &record, err);
+    if (rc < 0)
+        return rc;
+    if (!in->guard && !(in->guard = guard_link_new(&in->host, &record, &in->breathing.clk)))
+        return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    rc = transport_open_guarded(in->guard, p->address, &in->breathing.clk, &transport, err);
+    return rc < 0 ? rc : laser_over(in->laser_profile, transport, ret_laser, err);
+}
+
+int instrument_recognise(struct part_state *p, int rc, const char *identity, struct gon_error *err)
+{
+    if (rc >= 0)
+        rc = identity_same(p->identity, identity, err);
+    if (rc >= 0)
+        snprintf(p->identity, sizeof p->identity, "%s", identity);
+    p->refused |= rc == GON_E_DEVICE;
+    return rc;
+}
+
+static int begin_laser(struct instrument *in, char *ret_identity, size_t size,
+                       struct gon_error *err)
+{
+    const struct part_state *p = &in->part[PART_LASER];
     struct laser *laser;
     if (in->safety)
-        return safety_reopen(in->safety, p->identity, sizeof p->identity, err);
-    int rc = device_open_laser(p->driver, in->bench->folder, &in->laser_profile, p->address,
-                               &in->breathing.clk, NULL, &laser, err);
+        return safety_reopen(in->safety, ret_identity, size, err);
+    int rc = in->host.connect
+                 ? open_guarded(in, &laser, err)
+                 : device_open_laser(p->driver, in->bench->folder, &in->laser_profile, p->address,
+                                     &in->breathing.clk, NULL, &laser, err);
     if (rc < 0)
         return rc;
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
+    safety_guard(in->safety, in->guard);
     safety_obey(in->safety, in->stop);
-    return safety_begin(in->safety, p->identity, sizeof p->identity, err);
+    return safety_begin(in->safety, ret_identity, size, err);
+}
+
+// An OFF that is not confirmed is no matter of identity: it goes on being tried.
+static int connect_laser(struct instrument *in, struct gon_error *err)
+{
+    struct part_state *p = &in->part[PART_LASER];
+    const enum safety_light left = instrument_light_left(in);
+    char identity[sizeof p->identity] = "";
+    int rc = begin_laser(in, identity, sizeof identity, err);
+    if (rc < 0 && (!in->safety || safety_pending(in->safety)))
+        return rc;
+    rc = instrument_recognise(p, rc, identity, err);
+    in->behind = rc >= 0 ? SAFETY_LIGHT_OFF : left; // whoever confirmed OFF has to be the laser
+    return rc;
 }
 
 int instrument_write_set_up(struct instrument *in, struct gon_error *err)
@@ -203,8 +253,11 @@ static int connect_detector(struct instrument *in, struct gon_error *err)
                  ? in->detector->ops->reopen(in->detector, err)
                  : device_open_detector(p->driver, in->bench->folder, &in->detector_profile,
                                         p->address, &in->breathing.clk, NULL, &in->detector, err);
-    if (rc >= 0)
-        rc = in->detector->ops->identify(in->detector, p->identity, sizeof p->identity, err);
+    if (rc < 0)
+        return rc;
+    char identity[sizeof p->identity] = "";
+    rc = in->detector->ops->identify(in->detector, identity, sizeof identity, err);
+    rc = instrument_recognise(p, rc, identity, err);
     return rc < 0 ? rc : instrument_write_set_up(in, err);
 }
 
@@ -220,8 +273,10 @@ int instrument_connect(struct instrument *in, enum instrument_part part, struct 
              : part == PART_MONITOR  ? instrument_connect_monitor(in, err)
                                      : instrument_connect_device(in, part, err);
     rc = instrument_note(in, part, rc, err);
-    if (rc >= 0)
+    if (rc >= 0) {
+        in->part[part].refused = false;
         return 0;
+    }
     // Whatever the reason was: it is not usable, and trying again may help.
     in->part[part].link = PART_LOST;
     snprintf(in->part[part].problem, sizeof in->part[part].problem, "%.*s",
@@ -330,14 +385,16 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
     return hand_over(in, ret_instrument, err);
 }
 
-int instrument_open(const struct bench_config *bench, struct clk *clk,
-                    struct instrument **ret_instrument, struct gon_error *err)
+int instrument_open(const struct bench_config *bench, const struct guard_host *guard,
+                    struct clk *clk, struct instrument **ret_instrument, struct gon_error *err)
 {
     struct gon_error own;
     err = err ? err : &own;
     struct instrument *in = make(bench, clk);
     if (!in)
         return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
+    if (guard)
+        in->host = *guard;
     for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++)
         if (instrument_has(in, part)) {
             in->motor[part].bus = find_bus(bench, in->motor[part].config->bus);
@@ -353,8 +410,9 @@ bool instrument_free(struct instrument *in)
     if (!in)
         return true;
     in->watcher = NULL;
-    const bool dark = in->safety && safety_free(in->safety);
+    const bool dark = in->safety && safety_free(in->safety) && in->behind == SAFETY_LIGHT_OFF;
     in->safety = NULL;
+    guard_link_free(in->guard);
     for (int i = 0; i < INSTRUMENT_AXES; i++)
         if (in->motor[i].axis) {
             in->motor[i].axis->ops->stop(in->motor[i].axis, NULL);

@@ -9,6 +9,10 @@
 // brings it back. Errors that name a device name it once. The drivers get no cancel token: whatever
 // ends a run must still reach the laser and the axes; their own time limits bound each call.
 //
+// What comes back is the same device by the serial number it gave before (drivers/identity.h), or
+// stays lost and is not used: calls fail with the reason. An OFF that another laser confirmed says
+// nothing of the light of the one before.
+//
 // Every wait goes through instrument_wait, in slices of at most 100 ms that renew the laser's lease
 // (safety_tick) and call the watcher. Drivers are given a clock whose sleeping does the same.
 #pragma once
@@ -26,6 +30,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+struct guard_host;
 struct inputs;
 struct instrument;
 struct selector;
@@ -50,6 +55,8 @@ struct part_state {
     const char *address;  // of its link; "" when made from ready objects
     char identity[96];    // what it said it is
     char problem[240];    // why it is lost; "" when it is not
+    bool refused;         // it answered and is not to be used, as problem says: another device, by
+                          // its serial number or kind; until the right one is there
     uint64_t errors;      // failed calls since the start
     uint64_t returns;     // times it came back
     char last_error[240]; // "" when there was none since the start
@@ -89,6 +96,7 @@ struct instrument_snapshot {
     bool emission;             // commanded on and not read back off: what is to be assumed
     bool off_unconfirmed;      // LASER MAY BE ON
     int range;                 // of the detector; -1: not known
+    char detector_unit[12];    // of full_scale_v and signal_v: "V", "A", "W"
     double full_scale_v;
     double signal_v, monitor_v; // last sample; NAN: none
     int monitor_range;          // of a monitor of its own; -1: not known
@@ -110,8 +118,10 @@ struct instrument_parts {
 };
 
 // Opens what is there; what is not is lost, which is no error. GON_E_INPUT: a link's text is wrong;
-// GON_E_SYSTEM. The bench is borrowed for the object's life.
-int instrument_open(const struct bench_config *bench, struct clk *clk,
+// GON_E_SYSTEM. The bench is borrowed for the object's life. guard: who has the guard process that
+// is to hold the laser's port; NULL: this process opens it itself, which is for tests.
+int instrument_open(const struct bench_config *bench, const struct guard_host *guard,
+                    struct clk *clk,
                     struct instrument **ret_instrument, struct gon_error *err);
 int instrument_new(const struct bench_config *bench, const struct instrument_parts *parts,
                    struct clk *clk, struct instrument **ret_instrument, struct gon_error *err);
@@ -144,7 +154,7 @@ int instrument_reconnect(struct instrument *in);
 
 // A lost part, or PART_COUNT. One try to bring it back: reopen, identify; a laser is switched off,
 // an axis stopped, a detector set up as configured; a selector stays where it is. 0 when it is
-// there.
+// there. GON_E_DEVICE: another device answers in its place.
 enum instrument_part instrument_lost(const struct instrument *in);
 int instrument_connect(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_has(const struct instrument *in, enum instrument_part part);
@@ -190,6 +200,9 @@ void instrument_permit(struct instrument *in, bool running);
 // Once this stop is asked for, off goes out in the next slice of whatever is waited for, also in
 // the middle of another device's call. Borrowed until the next call; NULL: none.
 void instrument_obey(struct instrument *in, const struct cancel *stop);
+// What the laser's guard did without being asked, since the permission was given: 0, or why. The
+// laser is off then, or its guard is gone.
+int instrument_alarm(const struct instrument *in, struct gon_error *err);
 enum safety_light instrument_light_left(const struct instrument *in); // what may be said of it
 const struct safety *instrument_safety(const struct instrument *in);
 

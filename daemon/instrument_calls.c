@@ -206,10 +206,22 @@ void instrument_obey(struct instrument *in, const struct cancel *stop)
         safety_obey(in->safety, stop);
 }
 
-// A laser that was never reached was never told anything either.
+int instrument_alarm(const struct instrument *in, struct gon_error *err)
+{
+    struct gon_error own;
+    err = err ? err : &own;
+    int rc = in->safety ? safety_alarm(in->safety, err) : 0;
+    if (rc < 0)
+        gon_prefix(err, "laser");
+    return rc;
+}
+
+// A laser that was never reached was never told anything either, and one whose place another took
+// is as it was left.
 enum safety_light instrument_light_left(const struct instrument *in)
 {
-    return in->safety ? safety_light(in->safety) : SAFETY_LIGHT_UNCONFIRMED;
+    const enum safety_light now = in->safety ? safety_light(in->safety) : SAFETY_LIGHT_UNCONFIRMED;
+    return now > in->behind ? now : in->behind;
 }
 
 const struct safety *instrument_safety(const struct instrument *in)

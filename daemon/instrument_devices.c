@@ -85,8 +85,11 @@ static int connect_selector(struct instrument *in, struct companion *c, struct p
                                         &in->breathing.clk, NULL, &c->selector, err);
     if (rc >= 0)
         rc = check_positions(in, c, err);
-    if (rc >= 0)
-        rc = c->selector->ops->identify(c->selector, p->identity, sizeof p->identity, err);
+    if (rc < 0)
+        return rc;
+    char identity[sizeof p->identity] = "";
+    rc = c->selector->ops->identify(c->selector, identity, sizeof identity, err);
+    rc = instrument_recognise(p, rc, identity, err);
     return rc < 0 ? rc : c->selector->ops->where(c->selector, &c->position, NULL, err);
 }
 
@@ -133,12 +136,14 @@ static int connect_inputs(struct instrument *in, struct companion *c, struct par
         rc = inputs_reopen(c->inputs, err);
     if (rc < 0)
         return rc;
-    rc = inputs_identify(c->inputs, p->identity, sizeof p->identity, err);
+    char identity[sizeof p->identity] = "";
+    rc = inputs_identify(c->inputs, identity, sizeof identity, err);
     if ((rc == GON_E_LINK || rc == GON_E_GONE) && c->bus >= 0) {
         rc = instrument_open_bus(in, c->bus, err);
         if (rc >= 0)
-            rc = inputs_identify(c->inputs, p->identity, sizeof p->identity, err);
+            rc = inputs_identify(c->inputs, identity, sizeof identity, err);
     }
+    rc = instrument_recognise(p, rc, identity, err);
     rc = rc < 0 ? rc : inputs_read(c->inputs, err);
     return rc < 0 ? rc : check_values(in, c, err);
 }

@@ -13,6 +13,7 @@
 // twice the light, kept from there on. In both cases one up when a sample saturated.
 int instrument_fit_monitor(struct instrument *in, struct gon_error *err); // 0 without a monitor
 const char *instrument_monitor_unit(const struct instrument *in);         // "V", "W", "A"
+const char *instrument_detector_unit(const struct instrument *in);        // of its signal, too
 double instrument_monitor_time_constant_s(const struct instrument *in);   // 0 without one
 // What happened to it since instrument_clear: true when its samples are of no use. Its range is
 // then one up, or its settings are written again.

@@ -7,6 +7,7 @@
 #include "daemon/instrument.h"
 #include "daemon/suspend.h"
 #include "drivers/backoff.h"
+#include "drivers/guard_link.h"
 
 struct bus;
 struct profile;
@@ -61,7 +62,10 @@ struct instrument {
     struct bus *bus[BENCH_BUSES];
     struct motor motor[INSTRUMENT_AXES];
     struct profile *laser_profile, *detector_profile; // loaded when first needed; NULL before
+    struct guard_host host;   // no connect: there is no guard process
+    struct guard_link *guard; // NULL: not needed yet
     struct safety *safety;
+    enum safety_light behind; // of the laser whose place another took; SAFETY_LIGHT_OFF: none did
     const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;
     struct detector *detector;
@@ -85,6 +89,9 @@ struct instrument {
 // rc.
 int instrument_note(struct instrument *in, enum instrument_part part, int rc,
                     struct gon_error *err);
+// What came of identifying whoever answers: whether it is the part that was there before, by its
+// serial number; then the part has the identity. GON_E_DEVICE: another one, and the part is refused.
+int instrument_recognise(struct part_state *p, int rc, const char *identity, struct gon_error *err);
 // 0 when the part's object exists, so that it can be asked at all.
 int instrument_need(struct instrument *in, enum instrument_part part, struct gon_error *err);
 bool instrument_is_there(const struct instrument *in, enum instrument_part part); // can be asked

@@ -66,16 +66,28 @@ int instrument_connect_monitor(struct instrument *in, struct gon_error *err)
                  ? m->detector->ops->reopen(m->detector, err)
                  : device_open_detector(p->driver, in->bench->folder, &m->profile, p->address,
                                         &in->breathing.clk, NULL, &m->detector, err);
-    if (rc >= 0)
-        rc = m->detector->ops->identify(m->detector, p->identity, sizeof p->identity, err);
+    if (rc < 0)
+        return rc;
+    char identity[sizeof p->identity] = "";
+    rc = m->detector->ops->identify(m->detector, identity, sizeof identity, err);
+    rc = instrument_recognise(p, rc, identity, err);
     return rc < 0 ? rc : set_up(in, err);
+}
+
+static const char *unit_of_signal(const struct profile *p)
+{
+    const int signal = p ? profile_value(p, p->detector.signal) : -1;
+    return signal >= 0 ? p->values[signal].unit : "V";
 }
 
 const char *instrument_monitor_unit(const struct instrument *in)
 {
-    const struct profile *p = in->monitor.profile;
-    const int signal = p ? profile_value(p, p->detector.signal) : -1;
-    return signal >= 0 ? p->values[signal].unit : "V";
+    return unit_of_signal(in->monitor.profile);
+}
+
+const char *instrument_detector_unit(const struct instrument *in)
+{
+    return unit_of_signal(in->detector_profile);
 }
 
 double instrument_monitor_time_constant_s(const struct instrument *in)

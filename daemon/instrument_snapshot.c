@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include "daemon/instrument_devices.h"
 #include "daemon/instrument_inside.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 static const struct link_stats *stats_of(const struct instrument *in, enum instrument_part part)
@@ -28,14 +30,15 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
     *s = (struct instrument_snapshot){
         .t_ns = instrument_now_ns(in),
         .laser = in->laser,
-        .emission = in->safety && safety_emission(in->safety),
-        .off_unconfirmed = in->safety && safety_pending(in->safety),
+        .emission = instrument_light_left(in) == SAFETY_LIGHT_MAYBE,
+        .off_unconfirmed = in->safety && (safety_pending(in->safety) || in->behind),
         .range = in->range,
         .full_scale_v = in->range >= 0 ? instrument_full_scale_v(in, in->range) : (double)NAN,
         .signal_v = in->sample.signal_v,
         .monitor_v = in->sample.monitor_v,
         .time_constant_s = in->time_constant_s,
     };
+    snprintf(s->detector_unit, sizeof s->detector_unit, "%s", instrument_detector_unit(in));
     instrument_show_monitor(in, s);
     instrument_show_devices(in, s);
     instrument_show_suspenders(in, s);

@@ -5,9 +5,11 @@
 #include "base/log.h"
 #include "base/options.h"
 #include "base/paths.h"
+#include "base/standard.h"
 #include "campaign/bench.h"
 #include "campaign/catalog.h"
 #include "daemon/deadline.h"
+#include "daemon/guardian.h"
 #include "daemon/hub.h"
 #include "daemon/listener.h"
 #include "daemon/loop.h"
@@ -64,6 +66,8 @@ struct daemon {
     struct loop *loop;
     struct listener *listener;
     struct simulator *simulator;
+    struct guardian *guardian;
+    struct guard_host guard;
     struct bench_config bench;
     char *bench_text;
     struct profile_texts profiles;
@@ -308,6 +312,7 @@ static int open_hub(struct daemon *d, struct gon_error *err)
 {
     struct hub_options o = {
         .bench = &d->bench,
+        .guard = &d->guard,
         .bench_text = d->bench_text,
         .profiles = d->profiles.profile,
         .profiles_count = d->profiles.count,
@@ -320,6 +325,7 @@ static int open_hub(struct daemon *d, struct gon_error *err)
         .ended = ended,
         .ctx = d,
     };
+    d->guard.brief = d->simulator != NULL;
     int rc = hub_new(d->loop, listener_fd(d->listener), &o, &d->hub, err);
     rc = rc < 0 ? rc : loop_signals(d->loop, signaled, d, err);
     if (rc == 0 && d->simulator)
@@ -329,6 +335,17 @@ static int open_hub(struct daemon *d, struct gon_error *err)
     return rc;
 }
 
+// Before there are other threads, and before anything could be switched on.
+static int open_guard(struct daemon *d, struct gon_error *err)
+{
+    int rc = guardian_start(d->socket, &d->guardian, err);
+    if (rc < 0)
+        return rc;
+    guardian_when_crashed(d->guardian);
+    d->guard = guardian_host(d->guardian);
+    return GON_OK;
+}
+
 // The socket first: a second daemon must be refused before it touches a device.
 static int run(struct daemon *d)
 {
@@ -336,6 +353,7 @@ static int run(struct daemon *d)
     int rc = allow_descriptors(&err);
     rc = rc < 0 ? rc : service_open(&d->service, &err);
     rc = rc < 0 ? rc : open_socket(d, &err);
+    rc = rc < 0 ? rc : open_guard(d, &err);
     rc = rc < 0 ? rc : open_bench(d, &err);
     rc = rc < 0 ? rc : open_places(d, &err);
     if (rc == 0) {
@@ -353,6 +371,7 @@ static int run(struct daemon *d)
               stderr);
         d->status = 1;
     }
+    guardian_end(d->guardian);
     loop_free(d->loop);
     simulator_stop(d->simulator);
     catalog_drop(d->hold);
@@ -368,6 +387,7 @@ int main(int argc, char **argv)
     struct daemon d = {.options = {.log = "notice", .seed = -1}};
     struct gon_error err;
     enum log_level level = LOG_NOTICE;
+    standard_hold();
     int operands = options_take(argc, argv, rows, &d.options, NULL, 0, &err);
     if (operands < 0)
         return say_error(&err);

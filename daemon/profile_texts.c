@@ -47,8 +47,12 @@ int profile_texts_read(const struct bench_config *bench, struct profile_texts *r
     struct profile_texts t = {.count = 0};
     int rc = add(&t, bench->laser.driver, bench->folder, err);
     rc = rc < 0 ? rc : add(&t, bench->detector.driver, bench->folder, err);
+    if (rc >= 0 && *bench->monitor.driver)
+        rc = add(&t, bench->monitor.driver, bench->folder, err);
     for (int i = 0; i < bench->axes_count && rc >= 0; i++)
         rc = add(&t, bench->axes[i].driver, bench->folder, err);
+    for (int i = 0; i < bench->devices_count && rc >= 0; i++)
+        rc = add(&t, bench->devices[i].driver, bench->folder, err);
     if (rc < 0) {
         profile_texts_free(&t);
         return rc;

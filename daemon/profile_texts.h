@@ -6,7 +6,7 @@
 #include "campaign/bench.h"
 #include "campaign/store.h"
 
-enum { PROFILE_TEXTS = BENCH_AXES + 2 };
+enum { PROFILE_TEXTS = BENCH_AXES + BENCH_DEVICES + 3 };
 
 struct profile_texts {
     struct store_profile profile[PROFILE_TEXTS]; // each name once; the names are the bench's

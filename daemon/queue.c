@@ -420,6 +420,23 @@ void queue_closed(struct queue *q, int id, const struct gon_error *err)
         finish(q, q->ended_as, q->active->text);
 }
 
+void queue_reopened(struct queue *q, int id)
+{
+    assert(q->phase == CLOSING && q->active->id == id);
+    struct run *run = q->active;
+    if (q->stopping || q->ending) {
+        finish(q, RUN_STOPPED, run->text);
+        return;
+    }
+    q->active = NULL;
+    q->phase = IDLE;
+    put_in(q, 0, id);
+    run->held = false;
+    change(q, run, RUN_QUEUED, run->text);
+    next(q);
+    keep(q);
+}
+
 const struct run *queue_active(const struct queue *q)
 {
     return q->active;

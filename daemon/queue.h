@@ -93,6 +93,8 @@ void queue_fit_asked(struct queue *q, int id, int sweep, bool last);
 void queue_fitted(struct queue *q, int id, const char *fit, const struct gon_error *err);
 void queue_ended(struct queue *q, int id, enum run_state state, const struct gon_error *err);
 void queue_closed(struct queue *q, int id, const struct gon_error *err); // err NULL: closed well
+// Closed well, but points of it are to be measured again: it waits, as the first.
+void queue_reopened(struct queue *q, int id);
 
 const struct run *queue_active(const struct queue *q); // has the bench; NULL: none
 const struct run *queue_run(const struct queue *q, int id);

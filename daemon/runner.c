@@ -304,7 +304,8 @@ static void *thread_main(void *ctx)
 {
     struct runner *r = ctx;
     struct note *failed = note_new(NOTE_ENDED);
-    int rc = instrument_open(r->links.bench, clk_system(), &r->in, &failed->err);
+    pthread_setname_np(pthread_self(), "instrument");
+    int rc = instrument_open(r->links.bench, r->links.guard, clk_system(), &r->in, &failed->err);
     if (rc < 0) {
         note_post(r->links.to_main, failed); // run 0: the bench itself
         return NULL;

@@ -10,12 +10,14 @@
 
 struct bench_config;
 struct cancel;
+struct guard_host;
 struct mail;
 struct runner;
 
 // All borrowed for the thread's life; bench is not changed by anybody.
 struct runner_links {
     const struct bench_config *bench;
+    const struct guard_host *guard; // of the process that holds the laser's port
     const struct cancel *cancel; // ends a run
     const char *directory;       // of the campaigns: its disk is watched
     struct mail *box;            // the thread's own

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/safety.h"
 
+#include "drivers/guard_link.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,7 +14,10 @@ struct safety {
     bool pending;  // off was sent and not read back
     bool busy;     // in a call of the laser's: its waits tick too
     bool obeyed;   // the stop was told once
+    bool warned;   // the alarm was
     const struct cancel *stop;
+    struct guard_link *guard; // NULL: none
+    struct gon_error alarm;   // of the guard's; code 0: none
     int64_t tick_ns, worst_gap_ns;
 };
 
@@ -25,6 +30,11 @@ struct safety *safety_new(struct laser *laser, struct clk *clk)
     }
     *s = (struct safety){.laser = laser, .clk = clk, .tick_ns = clk_now_ns(clk)};
     return s;
+}
+
+void safety_guard(struct safety *s, struct guard_link *guard)
+{
+    s->guard = guard;
 }
 
 bool safety_free(struct safety *s)
@@ -65,6 +75,8 @@ int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_erro
 void safety_permit(struct safety *s, bool running)
 {
     s->running = running;
+    if (!running)
+        s->alarm = (struct gon_error){0};
 }
 
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err)
@@ -78,6 +90,8 @@ static int check_may_emit(struct safety *s, struct gon_error *err)
     struct laser_status now;
     if (!s->running)
         return gon_fail(err, GON_E_REFUSED, "stays off: no campaign is running");
+    if (s->alarm.code)
+        return safety_alarm(s, err);
     if (s->pending)
         return gon_fail(err, GON_E_REFUSED, "stays off: an earlier OFF was not confirmed");
     int rc = safety_status(s, &now, err);
@@ -102,12 +116,19 @@ int safety_on(struct safety *s, struct gon_error *err)
 
     // From here until an off is read back the laser counts as emitting, whatever the answer is.
     s->emission = true;
+    s->warned = false;
     s->tick_ns = clk_now_ns(s->clk);
     s->busy = true;
     rc = talked(s, s->laser->ops->on(s->laser, err));
     if (rc < 0)
         safety_off(s, NULL);
     return rc;
+}
+
+// One try; of a guard, which tries by itself, all of the time.
+static int off_once(struct safety *s, int64_t until_ns, struct gon_error *err)
+{
+    return s->guard ? guard_link_off(s->guard, until_ns, err) : s->laser->ops->off(s->laser, err);
 }
 
 // A link that is gone is tried again by whoever reopens it: waiting here would only delay that.
@@ -118,7 +139,7 @@ int safety_off(struct safety *s, struct gon_error *err)
     int rc;
     s->pending = s->busy = true;
     for (;;) {
-        rc = s->laser->ops->off(s->laser, &why);
+        rc = off_once(s, until_ns, &why);
         if (rc >= 0) {
             s->emission = s->pending = false;
             return talked(s, 0);
@@ -143,21 +164,48 @@ void safety_obey(struct safety *s, const struct cancel *stop)
 // The lease that the laser itself gives. When renewing fails it runs out: that is what it is for.
 static void keep_alive(struct safety *s)
 {
-    if (!s->emission || s->pending || s->busy || cancel_requested(s->stop) ||
+    if (!s->emission || s->pending || s->busy || s->alarm.code || cancel_requested(s->stop) ||
         !s->laser->ops->keep_alive)
         return;
     s->busy = true;
     talked(s, s->laser->ops->keep_alive(s->laser, NULL));
 }
 
+// The guard's lease goes on also while the laser is being talked to. An alarm is kept here: whoever
+// switches off after it makes the guard forget. While nothing runs that is due at the next look.
+static void mind_guard(struct safety *s)
+{
+    struct gon_error why;
+    if (!s->guard)
+        return;
+    if (s->emission && !s->pending && !s->alarm.code)
+        guard_link_renew(s->guard);
+    if (guard_link_watch(s->guard, &why) == 0)
+        return;
+    if (!s->alarm.code)
+        s->alarm = why;
+    if (!s->running)
+        s->pending = true;
+}
+
+int safety_alarm(const struct safety *s, struct gon_error *err)
+{
+    return s->alarm.code ? gon_fail(err, s->alarm.code, "%s", s->alarm.text) : 0;
+}
+
 bool safety_tick(struct safety *s)
 {
+    mind_guard(s);
     keep_alive(s);
     const int64_t now_ns = clk_now_ns(s->clk);
     if (s->emission && now_ns - s->tick_ns > s->worst_gap_ns)
         s->worst_gap_ns = now_ns - s->tick_ns;
     s->tick_ns = now_ns;
-    if (!s->emission || s->busy || s->obeyed || !cancel_requested(s->stop))
+    if (!s->emission || s->busy)
+        return false;
+    if (s->alarm.code && !s->warned)
+        return s->warned = true;
+    if (s->obeyed || !cancel_requested(s->stop))
         return false;
     return s->obeyed = true;
 }

@@ -11,9 +11,12 @@
 //  - a stop is obeyed whatever the thread waits for (safety_obey): the next tick tells that off is
 //    due, once for each stop; whoever ends the run repeats it until it is read back;
 //  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms.
-//    Today the longest gap is only measured; the guard process that holds the port will act on it.
-//    A laser with a lease of its own (keep_alive) is told in the same tick, and no longer once off
-//    was sent: it goes off by itself when this thread hangs.
+//    With a guard process (safety_guard) that renews the lease: 500 ms of silence, or our death,
+//    and the guard switches off. Then, after gonio laser off, and when the guard itself is gone,
+//    the alarm stands (safety_alarm), off is due, and on is refused until the permission is taken
+//    back (again); without permission off is pending. A laser with a lease of its own (keep_alive)
+//    is told in the same tick, and no longer once off was sent: it goes off by itself when this
+//    thread hangs.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -24,6 +27,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+struct guard_link;
 struct link_stats;
 struct safety;
 
@@ -39,6 +43,9 @@ enum safety_light {
 
 // Takes over laser, also when it fails (then the laser is freed). NULL without memory.
 struct safety *safety_new(struct laser *laser, struct clk *clk);
+// The guard that holds the laser's port, borrowed: it does the switching off and reads it back.
+// Without one the laser's driver does; that is for tests.
+void safety_guard(struct safety *s, struct guard_link *guard);
 // Off first, as well as the link allows; false when it was not read back. NULL is fine.
 bool safety_free(struct safety *s);
 
@@ -48,8 +55,8 @@ int safety_begin(struct safety *s, char *ret_text, size_t size, struct gon_error
 // One try at the link, then safety_begin.
 int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_error *err);
 
-void safety_permit(struct safety *s,
-                   bool running); // a run begins or ends; ending sends nothing itself
+// A run begins or ends; ending sends nothing itself, and forgets the alarm.
+void safety_permit(struct safety *s, bool running);
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err);
 
 // GON_E_REFUSED: no running campaign, interlock open, key; GON_E_DEVICE: fault. Accepted is not
@@ -60,8 +67,11 @@ int safety_off(struct safety *s, struct gon_error *err);
 // The token of a stop, borrowed until the next call; NULL: none.
 void safety_obey(struct safety *s, const struct cancel *stop);
 // Renews the lease; costs nothing while emission is off. True when off is due: a stop was asked for
-// with the light on, and the laser is not being talked to.
+// with the light on, or the guard raised the alarm, and the laser is not being talked to.
 bool safety_tick(struct safety *s);
+// What the guard did without being asked, or that it is gone, since the last end of a run: 0, or
+// GON_E_REFUSED or GON_E_DEVICE.
+int safety_alarm(const struct safety *s, struct gon_error *err);
 
 int safety_status(struct safety *s, struct laser_status *ret_status, struct gon_error *err);
 // One short question: whether the laser says that light comes out.

@@ -6,6 +6,8 @@
 #include "campaign/plan_states.h"
 #include "campaign/reduce.h"
 #include "campaign/store.h"
+#include "campaign/store_exclude.h"
+#include "daemon/decision.h"
 #include "daemon/keeper.h"
 #include "daemon/material.h"
 #include "daemon/note.h"
@@ -131,6 +133,16 @@ static void keep_queue(struct storer *s, const struct note *n)
         note_post(s->links.to_main, complaint);
 }
 
+// The mail is read in its order: what was to be kept before is on the disk now.
+static void send_back(struct storer *s, const struct note *n)
+{
+    struct note *kept = note_new(NOTE_KEPT);
+    kept->ticket = n->ticket;
+    kept->run = n->run;
+    kept->text = note_text(n->text);
+    note_post(s->links.to_main, kept);
+}
+
 // --- a new campaign ------------------------------------------------------------------------------
 
 static void add_line(void *ctx, const char *line)
@@ -185,6 +197,8 @@ static void answer_known(struct storer *s, const struct note *question, enum not
     struct note *n = note_new(kind);
     n->ticket = question->ticket;
     n->run = question->run;
+    n->last = question->last;
+    n->count = question->count;
     n->text = complaints;
     n->thing = entry ? run_of(s, entry) : NULL;
     if (!entry)
@@ -266,25 +280,36 @@ static int read_opening(struct store *store, struct run_material *m, struct gon_
     return GON_OK;
 }
 
+static int check_bench(const struct storer *s, struct store *store, struct gon_error *err)
+{
+    struct bench_config then;
+    int rc = store_read_bench(store, &then, err);
+    return rc < 0 ? rc : same_bench(&then, s->links.bench, err);
+}
+
 static int read_material(const struct storer *s, struct store *store, struct run_material *m,
                          struct gon_error *err)
 {
-    struct bench_config then;
     int rc = store_read_config(store, &m->config, err);
-    rc = rc < 0 ? rc : store_read_bench(store, &then, err);
-    rc = rc < 0 ? rc : same_bench(&then, s->links.bench, err);
+    rc = rc < 0 ? rc : check_bench(s, store, err);
+    rc = rc < 0 ? rc : store_reopen_closing(store, utc_ms(s), err);
     rc = rc < 0 ? rc : store_read_plan(store, &m->plan, err);
     return rc < 0 ? rc : read_opening(store, m, err);
 }
 
-// What was measured with from now on, and what opening the file did to it.
-static int keep_today(const struct storer *s, struct store *store, struct gon_error *err)
+// What opening the file did to it.
+static int keep_notice(const struct storer *s, struct store *store, struct gon_error *err)
 {
     const char *notice = store_notice(store);
+    return *notice ? store_append_event(store, utc_ms(s), "notice", "store", notice, err) : GON_OK;
+}
+
+// What was measured with from now on.
+static int keep_today(const struct storer *s, struct store *store, struct gon_error *err)
+{
     int rc =
         store_append_profiles(store, utc_ms(s), s->links.profiles, s->links.profiles_count, err);
-    return rc >= 0 && *notice ? store_append_event(store, utc_ms(s), "notice", "store", notice, err)
-                              : rc;
+    return rc < 0 ? rc : keep_notice(s, store, err);
 }
 
 static int open_file(const struct storer *s, const char *path, struct store **ret_store,
@@ -362,10 +387,25 @@ static void append_fit(struct storer *s, const struct note *n)
     note_post(s->links.to_main, answer);
 }
 
-static void close_run(struct storer *s, const struct note *n)
+// The engine is done with the plan that it was given; since then somebody may have had a sweep of it
+// measured again.
+static bool is_open_again(const struct storer *s, const struct note *n)
+{
+    struct store_progress p;
+    return n->state == RUN_DONE && s->store && n->run == s->run &&
+           store_read_progress(s->store, &p, NULL) == 0 && p.again > 0;
+}
+
+static void close_run(struct storer *s, struct note *n)
 {
     struct note *answer = note_new(NOTE_CLOSED);
     answer->run = n->run;
+    answer->last = is_open_again(s, n);
+    if (answer->last) {
+        n->state = RUN_STOPPED;
+        free(n->text);
+        n->text = note_text("what is to be measured again comes next");
+    }
     if (append_state(s, n, &answer->err) == 0)
         answer->err.code = GON_OK;
     store_close(s->store,
@@ -431,6 +471,35 @@ static void look(struct storer *s, const struct note *n)
                  &err, NULL);
 }
 
+// --- decisions about readings --------------------------------------------------------------------
+
+// The run that is measured has its file open already; another's is opened for the moment.
+static int decide_in(struct storer *s, const struct note *n, const char *path,
+                     struct gon_error *err)
+{
+    struct store *store = NULL;
+    if (s->store && n->run == s->run)
+        return decision_make(n->thing, s->store, utc_ms(s), err);
+    int rc = store_open(path, STORE_WRITE, &store, err);
+    rc = rc < 0 ? rc : keep_notice(s, store, err);
+    if (rc >= 0 && n->last) // it will be measured on this bench
+        rc = check_bench(s, store, err);
+    rc = rc < 0 ? rc : decision_make(n->thing, store, utc_ms(s), err);
+    store_close(store, NULL);
+    return rc;
+}
+
+static void decide(struct storer *s, struct note *n)
+{
+    struct catalog_entry e;
+    struct gon_error err;
+    char path[CATALOG_PATH];
+    int rc = catalog_find(s->links.directory, n->run, path, sizeof path, &err);
+    n->count = rc < 0 ? rc : decide_in(s, n, path, &err);
+    rc = n->count < 0 ? n->count : read_entry(path, &e, &err);
+    answer_known(s, n, NOTE_DECIDED, rc < 0 ? NULL : &e, &err, NULL);
+}
+
 void storer_step(struct storer *s, struct note *n)
 {
     switch ((enum note_kind)n->letter.kind) {
@@ -449,6 +518,8 @@ void storer_step(struct storer *s, struct note *n)
     case NOTE_FIT: append_fit(s, n); break;
     case NOTE_CLOSE: close_run(s, n); break;
     case NOTE_QUEUE: keep_queue(s, n); break;
+    case NOTE_DECIDE: decide(s, n); break;
+    case NOTE_KEPT: send_back(s, n); break;
     default: break;
     }
     note_free(n);

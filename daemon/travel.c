@@ -8,6 +8,16 @@
 #include <string.h>
 
 #define HOME_LEAST_S 120.0
+#define HOME_TRIES 3
+#define HOME_STOOD_NS CLK_S(2) // neither moving nor homed: it does not home any more
+
+static int moved_by_itself(const struct bench_axis *axis, double from, double to,
+                           struct gon_error *err)
+{
+    return gon_fail(err, GON_E_DEVICE,
+                    "axis %s: moved by itself from %.4f to %.4f %s; look at it, then: gonio resume",
+                    axis->name, from, to, axis->unit_name);
+}
 
 // Encoders of all axes, also of those that were not to move: an axis that strays is noticed here.
 static int where(struct instrument *in, const struct travel_pose *target,
@@ -25,10 +35,7 @@ static int where(struct instrument *in, const struct travel_pose *target,
             const struct bench_axis *axis = instrument_axis(in, part);
             if (!isnan(target->at[part]) &&
                 fabs(p.position - target->at[part]) > 2.0 * bench_axis_tolerance(axis))
-                return gon_fail(err, GON_E_DEVICE,
-                                "axis %s: moved by itself from %.4f to %.4f %s; look at it, then: "
-                                "gonio resume",
-                                axis->name, target->at[part], p.position, axis->unit_name);
+                return moved_by_itself(axis, target->at[part], p.position, err);
         }
         pose.at[part] = p.position;
     }
@@ -88,6 +95,26 @@ int travel_move(struct instrument *in, const struct travel_pose *target,
     return rc < 0 ? rc : where(in, target, ret_actual, err);
 }
 
+int travel_still(struct instrument *in, const struct travel_pose *at, struct gon_error *err)
+{
+    for (enum instrument_part part = 0; part < INSTRUMENT_AXES; part++) {
+        struct axis_place p;
+        if (!instrument_has(in, part))
+            continue;
+        int rc = instrument_place(in, part, &p, err);
+        if (rc >= 0)
+            rc = travel_check(in, part, &p, err);
+        if (rc < 0)
+            return rc;
+        const struct bench_axis *axis = instrument_axis(in, part);
+        if (isnan(at->at[part]))
+            continue;
+        if (p.moving || fabs(p.position - at->at[part]) > bench_axis_tolerance(axis))
+            return moved_by_itself(axis, at->at[part], p.position, err);
+    }
+    return 0;
+}
+
 struct travel_pose travel_stay(void)
 {
     struct travel_pose pose = {.still_ns = 0};
@@ -126,6 +153,15 @@ int travel_station(const struct instrument *in, const char *name, struct travel_
     return rc;
 }
 
+// It may have restarted: what it has to be told first (an enable) went with its power.
+static int begin_homing(struct instrument *in, enum instrument_part part, struct gon_error *err)
+{
+    int rc = instrument_connect(in, part, err);
+    if (rc >= 0)
+        rc = instrument_go_home(in, part, err);
+    return rc == GON_E_LINK ? 0 : rc; // carried out or not: the status says
+}
+
 static int home_one(struct instrument *in, enum instrument_part part, const struct cancel *cancel,
                     struct gon_error *err)
 {
@@ -139,17 +175,25 @@ static int home_one(struct instrument *in, enum instrument_part part, const stru
 
     const double limit_s = fmax(HOME_LEAST_S, 4.0 * (axis->max - axis->min) / axis->speed);
     const int64_t until_ns = instrument_now_ns(in) + CLK_S(limit_s);
-    rc = instrument_go_home(in, part, err);
-    if (rc == GON_E_LINK) // carried out or not: the status says
-        rc = 0;
-    while (rc >= 0) {
-        if (instrument_wait(in, instrument_now_ns(in) + CLK_MS(50), cancel) < 0)
+    int64_t moved_ns = 0;
+    for (int begun = 0; rc >= 0;) {
+        // It stands and is not homed: it was not told yet, or restarted on the way.
+        if (begun == 0 ||
+            (begun < HOME_TRIES && instrument_now_ns(in) - moved_ns > HOME_STOOD_NS)) {
+            rc = begin_homing(in, part, err);
+            moved_ns = instrument_now_ns(in);
+            begun++;
+        }
+        if (rc >= 0 && instrument_wait(in, instrument_now_ns(in) + CLK_MS(50), cancel) < 0)
             return gon_fail(err, GON_E_CANCELED, "stopped while homing");
-        rc = instrument_place(in, part, &p, err);
+        if (rc >= 0)
+            rc = instrument_place(in, part, &p, err);
         if (rc >= 0 && p.alarm)
             return travel_check(in, part, &p, err);
         if (rc >= 0 && p.homed && !p.moving)
             return 0;
+        if (rc >= 0 && p.moving)
+            moved_ns = instrument_now_ns(in);
         if (rc >= 0 && instrument_now_ns(in) > until_ns)
             return gon_fail(err, GON_E_DEVICE,
                             "axis %s: not homed after %.0f s; look at its home switch, then: gonio "

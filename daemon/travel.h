@@ -31,6 +31,9 @@ struct travel_pose {
 // not). Axes that need not move are asked at least each INSTRUMENT_FRESH_MS.
 int travel_move(struct instrument *in, const struct travel_pose *target,
                 const struct cancel *cancel, struct travel_pose *ret_actual, struct gon_error *err);
+// Asks all axes: without alarm, homed, and still standing there within their deadbands (NAN:
+// wherever it is). GON_E_DEVICE: one moved by itself, or has an alarm.
+int travel_still(struct instrument *in, const struct travel_pose *at, struct gon_error *err);
 struct travel_pose travel_stay(void); // all axes where they are
 // The sample in, and the axes where kinematics puts that geometry; GON_E_INPUT when it cannot be.
 int travel_to_sample(const struct instrument *in, double theta_i_deg, double theta_r_deg,
@@ -38,6 +41,8 @@ int travel_to_sample(const struct instrument *in, double theta_i_deg, double the
 // The pose of a station by its name; GON_E_INPUT when the bench has none of that name.
 int travel_station(const struct instrument *in, const char *name, struct travel_pose *ret_pose,
                    struct gon_error *err);
-// Homes the axes that say they are not; others stay. An axis with an alarm is GON_E_DEVICE.
+// Homes the axes that say they are not, each after it was identified again; others stay. One that
+// for 2 s neither moves nor is homed (it restarted) is told again, twice at most. An axis with an
+// alarm is GON_E_DEVICE.
 int travel_home(struct instrument *in, const struct cancel *cancel, struct gon_error *err);
 int travel_stop(struct instrument *in, struct gon_error *err); // all of them; the first error

@@ -111,6 +111,7 @@ static void add_laser(json_t *o, const struct instrument_snapshot *s)
 static void add_detector(json_t *o, const struct instrument_snapshot *s)
 {
     json_object_set_new(o, "range", json_integer(s->range));
+    json_object_set_new(o, "unit", json_string(s->detector_unit));
     json_object_set_new(o, "full_scale_v", view_number(s->full_scale_v));
     json_object_set_new(o, "signal_v", view_number(s->signal_v));
     json_object_set_new(o, "monitor_v", view_number(s->monitor_v));

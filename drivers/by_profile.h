@@ -13,10 +13,14 @@ struct detector;
 struct laser;
 struct profile;
 struct selector;
+struct transport;
 
 // As laser.h. off goes out at once, whatever the gap, then after it and until it is read back.
 int laser_by_profile(const struct profile *p, const char *link, struct clk *clk,
                      const struct cancel *cancel, struct laser **ret_laser, struct gon_error *err);
+// The same over a transport that is open, which is taken over, also when it fails.
+int laser_over(const struct profile *p, struct transport *transport, struct laser **ret_laser,
+               struct gon_error *err);
 // As detector.h; a monitor is one too.
 int detector_by_profile(const struct profile *p, const char *link, struct clk *clk,
                         const struct cancel *cancel, struct detector **ret_detector,

@@ -27,6 +27,7 @@ struct profiled_detector {
     unsigned turn;    // of the ways to ask for a sample
     unsigned flags;   // of samples since the last condition
     bool restarted;   // since the last setup
+    uint64_t strays;  // answers too many, of the link, at the last clear
 };
 
 static struct profiled_detector *detector_of(struct detector *d)
@@ -42,6 +43,11 @@ static struct transport *transport_of(const struct profiled_detector *z)
 static int identify(struct detector *d, char *ret_text, size_t size, struct gon_error *err)
 {
     return session_identify(detector_of(d)->s, ret_text, size, err);
+}
+
+static const struct link_stats *stats(const struct detector *d)
+{
+    return message_stats(session_message(((const struct profiled_detector *)d)->s));
 }
 
 // --- ranges --------------------------------------------------------------------------------------
@@ -266,8 +272,11 @@ static int sample(struct detector *d, struct detector_sample *ret_sample, struct
 
 static int clear(struct detector *d, struct gon_error *err)
 {
-    detector_of(d)->flags = 0;
-    return session_ask(detector_of(d)->s, &detector_of(d)->is->clear, err);
+    struct profiled_detector *z = detector_of(d);
+    z->flags = 0;
+    int rc = session_ask(z->s, &z->is->clear, err);
+    z->strays = stats(d)->errors[LINK_STRAY];
+    return rc;
 }
 
 static bool has_changed(struct profiled_detector *z, const struct profile_asks *asks)
@@ -282,7 +291,14 @@ static bool has_changed(struct profiled_detector *z, const struct profile_asks *
 static int condition(struct detector *d, unsigned *ret_flags, struct gon_error *err)
 {
     struct profiled_detector *z = detector_of(d);
+    const struct link_stats *book = stats(d);
+    const uint64_t resyncs = book->resyncs;
     int rc = session_ask(z->s, &z->is->condition, err);
+    // Reading clears it: what a lost answer told is gone. And where an answer was too many, one
+    // before it may have been an older question's.
+    if (book->resyncs != resyncs || book->errors[LINK_STRAY] != z->strays)
+        z->flags |= DETECTOR_UNSETTLED;
+    z->strays = book->errors[LINK_STRAY];
     if (session_restarted(z->s))
         z->restarted = true;
     if (rc < 0)
@@ -303,11 +319,6 @@ static int reopen(struct detector *d, struct gon_error *err)
     int rc = session_reopen(z->s, err);
     put_setup(z); // what samples are asked with
     return rc;
-}
-
-static const struct link_stats *stats(const struct detector *d)
-{
-    return message_stats(session_message(((const struct profiled_detector *)d)->s));
 }
 
 static void detector_free(struct detector *d)

@@ -91,10 +91,10 @@ static int copy_text(const struct golden_bytes *b, char ret_text[PROFILE_LONG],
 }
 
 // As the golden check puts it together, backwards.
-static int unwrap(const struct profile *p, const struct captured *c, struct profile_golden *g,
+static int unwrap(const struct golden_maker *m, const struct captured *c, struct profile_golden *g,
                   struct gon_error *err)
 {
-    const struct profile_framing *f = &p->framing;
+    const struct profile_framing *f = &m->p->framing;
     struct golden_bytes sent = c->sent, received = c->received;
     if (!cut_end(&sent, f->end_out))
         return gon_fail(err, GON_E_INPUT, "it did not leave as a whole");
@@ -104,6 +104,8 @@ static int unwrap(const struct profile *p, const struct captured *c, struct prof
     if (*f->echo_end && received.size > 0 &&
         (!cut_begin(&received, g->sent) || !cut_begin(&received, f->echo_end)))
         return gon_fail(err, GON_E_LINK, "the command was not repeated as it was sent");
+    if (received.size > 0 && !m->is_usb && !ends_with(&received, f->end_in))
+        return gon_fail(err, GON_E_LINK, "broken off: it does not end as the profile says");
     if (*f->ok_line && cut_end(&received, f->end_in))
         cut_end(&received, f->ok_line);
     cut_end(&received, f->end_in);
@@ -181,7 +183,7 @@ static int make_message(const struct golden_maker *m, const struct captured *c, 
 {
     const struct profile *p = m->p;
     bool uses[PROFILE_VALUES] = {false};
-    int rc = unwrap(p, c, g, err);
+    int rc = unwrap(m, c, g, err);
     if (rc < 0)
         return rc;
     const struct profile_exchange *x = sender(p, does, d, g->sent);

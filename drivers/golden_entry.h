@@ -14,6 +14,7 @@ struct golden_maker {
     enum golden_wire wire; // RTU frames are made of those of TCP: without header, with CRC
     int unit;
     const char *source; // of the entries; at most PROFILE_TEXT - 1 are kept
+    bool is_usb;        // the transfer ends an answer; elsewhere only its terminator does
 };
 
 // does: the exchange or write that it probably was; others are tried, too. with: what that was told

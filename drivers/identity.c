@@ -26,3 +26,16 @@ void identity_serial(const char *identity, char *ret_serial, size_t size)
         from += 3;
     snprintf(ret_serial, size, "%.*s", (int)strcspn(from, ", "), from);
 }
+
+int identity_same(const char *before, const char *now, struct gon_error *err)
+{
+    char known[64], said[64];
+    identity_serial(before, known, sizeof known);
+    identity_serial(now, said, sizeof said);
+    if (!*known || strcmp(known, said) == 0)
+        return 0;
+    return gon_fail(err, GON_E_DEVICE,
+                    "another device answers here: serial number %s before, %s now; plug the former "
+                    "one in again, or restart goniod when the exchange is meant",
+                    known, *said ? said : "none");
+}

@@ -303,8 +303,9 @@ static int check_profile(const struct profile *p, struct gon_error *err)
     return 0;
 }
 
-int laser_by_profile(const struct profile *p, const char *link, struct clk *clk,
-                     const struct cancel *cancel, struct laser **ret_laser, struct gon_error *err)
+// Takes the session over.
+static int make(const struct profile *p, struct session *s, struct laser **ret_laser,
+                struct gon_error *err)
 {
     static const struct laser_ops ops = {
         .identify = identify,
@@ -319,19 +320,31 @@ int laser_by_profile(const struct profile *p, const char *link, struct clk *clk,
         .stats = stats,
         .free = laser_free,
     };
-    struct session *s;
-    int rc = check_profile(p, err);
-    if (rc == 0)
-        rc = session_open(p, link, clk, cancel, &s, err);
-    if (rc < 0)
-        return rc;
     struct profiled_laser *z = calloc(1, sizeof *z);
     if (!z) {
         session_free(s);
-        return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
+        return gon_fail(err, GON_E_SYSTEM, "laser: out of memory");
     }
     *z = (struct profiled_laser){
         .laser = {&ops}, .s = s, .is = &p->laser, .alive_ns = INT64_MIN / 2};
     *ret_laser = &z->laser;
     return 0;
+}
+
+int laser_over(const struct profile *p, struct transport *transport, struct laser **ret_laser,
+               struct gon_error *err)
+{
+    struct session *s;
+    int rc = session_over(p, transport, &s, err);
+    return rc < 0 ? rc : make(p, s, ret_laser, err);
+}
+
+int laser_by_profile(const struct profile *p, const char *link, struct clk *clk,
+                     const struct cancel *cancel, struct laser **ret_laser, struct gon_error *err)
+{
+    struct session *s;
+    int rc = check_profile(p, err);
+    if (rc == 0)
+        rc = session_open(p, link, clk, cancel, &s, err);
+    return rc < 0 ? rc : make(p, s, ret_laser, err);
 }

@@ -29,6 +29,8 @@ static const char *const forms[] = {
                     "modbus-tcp:HOST:PORT",
 };
 
+static const char adapter_prefix[] = "usb-"; // in the place of a serial port's path
+
 static const int bauds[] = {1200,  2400,   4800,   9600,   19200, 38400,
                             57600, 115200, 230400, 460800, 921600};
 
@@ -106,6 +108,48 @@ static int parse_setting(const char *text, const char *item, size_t length, stru
                     (int)length, item);
 }
 
+// Four hexadecimal digits; -1: they are not that.
+static int hex_number(const char *text)
+{
+    static const char digits[] = "0123456789abcdef";
+    int value = 0;
+    for (int i = 0; i < 4; i++) {
+        const char *digit = text[i] ? strchr(digits, tolower((unsigned char)text[i])) : NULL;
+        if (!digit)
+            return -1;
+        value = 16 * value + (int)(digit - digits);
+    }
+    return value;
+}
+
+// The serial number is all that follows, colons too; it must be printable and without blanks.
+static bool is_serial_number(const char *text)
+{
+    for (const char *c = text; *c; c++)
+        if (*c <= ' ' || *c > '~')
+            return false;
+    return *text && strlen(text) < sizeof((struct link *)0)->place;
+}
+
+// "VID:PID" or "VID:PID:SERIAL": the serial number, "" without; NULL: it is not that.
+static const char *parse_numbers(const char *rest, struct link *l)
+{
+    const int vendor = hex_number(rest);
+    const int product = vendor >= 0 && rest[4] == ':' ? hex_number(rest + 5) : -1;
+    const char *after = product >= 0 ? rest + 9 : "?";
+    if (*after && (*after != ':' || !is_serial_number(after + 1)))
+        return NULL;
+    l->vendor = (uint16_t)vendor;
+    l->product = (uint16_t)product;
+    return *after ? after + 1 : after;
+}
+
+static bool parse_place(struct link *l)
+{
+    l->adapter = strncmp(l->place, adapter_prefix, strlen(adapter_prefix)) == 0;
+    return !l->adapter || parse_numbers(l->place + strlen(adapter_prefix), l);
+}
+
 static int parse_serial(const char *text, const char *rest, struct link *l, struct gon_error *err)
 {
     size_t length = strcspn(rest, "?");
@@ -113,6 +157,11 @@ static int parse_serial(const char *text, const char *rest, struct link *l, stru
         return gon_fail(err, GON_E_INPUT,
                         "link '%s': a path of 1 to %zu bytes must follow the colon", text,
                         sizeof l->place - 1);
+    if (!parse_place(l))
+        return gon_fail(err, GON_E_INPUT,
+                        "link '%s': after usb- comes VID:PID or VID:PID:SERIAL, VID and PID of four "
+                        "hexadecimal digits each (lsusb shows them); a path begins with /",
+                        text);
     l->baud = 115200;
     l->stop = 1;
     for (rest += length; *rest; rest += length) {
@@ -147,43 +196,15 @@ static int parse_tcp(const char *text, const char *rest, const char *port, struc
     return 0;
 }
 
-// Four hexadecimal digits; -1: they are not that.
-static int hex_number(const char *text)
-{
-    static const char digits[] = "0123456789abcdef";
-    int value = 0;
-    for (int i = 0; i < 4; i++) {
-        const char *digit = text[i] ? strchr(digits, tolower((unsigned char)text[i])) : NULL;
-        if (!digit)
-            return -1;
-        value = 16 * value + (int)(digit - digits);
-    }
-    return value;
-}
-
-// The serial number is all that follows, colons too; it must be printable and without blanks.
-static bool is_serial_number(const char *text)
-{
-    for (const char *c = text; *c; c++)
-        if (*c <= ' ' || *c > '~')
-            return false;
-    return *text && strlen(text) < sizeof((struct link *)0)->place;
-}
-
 static int parse_usbtmc(const char *text, const char *rest, struct link *l, struct gon_error *err)
 {
-    const int vendor = hex_number(rest);
-    const int product = vendor >= 0 && rest[4] == ':' ? hex_number(rest + 5) : -1;
-    const char *after = product >= 0 ? rest + 9 : "?";
-    if (*after && (*after != ':' || !is_serial_number(after + 1)))
+    const char *serial = parse_numbers(rest, l);
+    if (!serial)
         return gon_fail(err, GON_E_INPUT,
                         "link '%s': wants VID:PID or VID:PID:SERIAL, VID and PID of four "
                         "hexadecimal digits each (lsusb shows them)",
                         text);
-    l->vendor = (uint16_t)vendor;
-    l->product = (uint16_t)product;
-    if (*after)
-        strcpy(l->place, after + 1);
+    strcpy(l->place, serial);
     return 0;
 }
 
@@ -196,6 +217,14 @@ static int parse_rest(const struct scheme *s, const char *text, const char *rest
     case LINK_USBTMC: break;
     }
     return parse_usbtmc(text, rest, l, err);
+}
+
+const char *link_serial_number(const struct link *l)
+{
+    const size_t numbers = strlen(adapter_prefix) + strlen("0123:4567");
+    if (l->kind == LINK_USBTMC)
+        return l->place;
+    return l->adapter && l->place[numbers] ? l->place + numbers + 1 : "";
 }
 
 int link_parse(const char *text, enum link_use use, struct link *ret_link, struct gon_error *err)

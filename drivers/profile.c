@@ -111,5 +111,6 @@ int profile_find(const char *name, const char *folder, char *ret_path, size_t si
                                      try_program(&s, file);
     if (found)
         return 0;
-    return gon_fail(err, GON_E_INPUT, "no profile '%s': looked for %s", name, s.tried);
+    return gon_fail(err, GON_E_INPUT, "no profile '%s': looked for %s%s", name, s.tried,
+                    is_path ? "" : "; a file of your own is given as a path: ./NAME.cfg");
 }

@@ -12,6 +12,10 @@ static void check_framing(struct checking *c)
     if (f->quiet_ms < f->timeout_ms)
         check_says(c, check_at("framing.quiet_ms"),
                    "below timeout_ms: an answer that is waited for may come later than this");
+    if (*f->echo_end && *f->end_in && strstr(f->echo_end, f->end_in))
+        check_says(c, check_at("framing.echo_end"),
+                   "has end_in in it, so that the repeated command would be taken for the answer; "
+                   "of an instrument that repeats it as a line of its own switch the echo off");
     check_asked_name(c, check_at("framing.sync"), f->sync);
 }
 

@@ -93,16 +93,24 @@ static void check_literal(struct checking *c, struct place at, int value, const 
     free(d);
 }
 
+// An empty name is none here, where other settings may be left out.
+static bool check_changed(struct checking *c, struct place at, const char *name)
+{
+    if (!*name)
+        check_says(c, at, "missing; it says which value");
+    return *name && check_value_name(c, at, name);
+}
+
 void check_simulate(struct checking *c)
 {
     const struct profile_simulate *s = &c->p->simulate;
     for (int i = 0; i < s->start_count; i++)
-        if (check_value_name(c, check_at("simulate.start[%d].value", i), s->start[i].value))
+        if (check_changed(c, check_at("simulate.start[%d].value", i), s->start[i].value))
             check_literal(c, check_at("simulate.start[%d].is", i),
                           profile_value(c->p, s->start[i].value), s->start[i].is);
     for (int i = 0; i < s->drift_count; i++) {
         const struct profile_drift *d = &s->drift[i];
-        const bool known = check_value_name(c, check_at("simulate.drift[%d].value", i), d->value);
+        const bool known = check_changed(c, check_at("simulate.drift[%d].value", i), d->value);
         check_condition(c, check_at("simulate.drift[%d].when", i), d->when);
         if (known && profile_value(c->p, d->to) < 0)
             check_literal(c, check_at("simulate.drift[%d].to", i), profile_value(c->p, d->value),

@@ -76,7 +76,8 @@ void check_values(struct checking *c)
         if (v->scale == 0)
             check_says(c, check_at("values[%d].scale", i), "makes every number the same");
         if (v->min > v->max)
-            check_says(c, check_at("values[%d].min", i), "is above max");
+            check_says(c, check_at("values[%d].min", i), "is above max = %g%s", v->max,
+                       v->max == 0 ? ", which is 0 where it is not given" : "");
         check_words(c, i, v);
         check_ladder(c, i, v);
         check_bits(c, i, v);

@@ -108,7 +108,8 @@ static const struct cfg_row value_rows[] = {
     YES(profile_value, "inverse", inverse, "Instead: number = scale / wire + offset."),
     REAL(profile_value, "min", min, NULL, -1e300, 1e300, "0",
          "The least it can be; beyond it an answer is not believed, and nothing is sent."),
-    REAL(profile_value, "max", max, NULL, -1e300, 1e300, "0", "The most; equal to min: no limit."),
+    REAL(profile_value, "max", max, NULL, -1e300, 1e300, "0", "The most. Both equal, or both left out: no limit; give both, as one that is left out "
+         "is 0."),
     REAL(profile_value, "resolution", resolution, NULL, 0, 1e300, "0",
          "Of what the wire carries: a read-back may differ by so much."),
     REALS(profile_value, "over", over, over_count,
@@ -145,13 +146,15 @@ static const struct cfg_row framing_rows[] = {
     BYTES(profile_framing, "end_out", end_out, "", "Ends what is sent: \"\\r\"."),
     BYTES(profile_framing, "end_in", end_in, "", "Ends an answer: \"\\r\\n\"."),
     BYTES(profile_framing, "echo_end", echo_end, "",
-          "The device repeats each command, followed by this; without it there is no echo."),
+          "The device repeats each command, followed by this; without it there is no echo. May not "
+          "contain end_in."),
     TEXT(profile_framing, "ok_line", ok_line, "",
          "A line that follows every good answer, and is all the answer to a setting."),
     YES(profile_framing, "empty", empty, "An empty line is an answer, too."),
-    REAL(profile_framing, "gap_ms", gap_ms, "ms", 0, 1000, "0",
-         "From an answer to the next command, which may be ignored when it comes sooner; of a laser "
-         "also the time in which the answer to an OFF that was not waited for comes."),
+    REAL(
+        profile_framing, "gap_ms", gap_ms, "ms", 0, 1000, "0",
+        "From an answer to the next command, which may be ignored when it comes sooner; of a laser "
+        "also the time in which the answer to an OFF that was not waited for comes."),
     REAL(profile_framing, "timeout_ms", timeout_ms, "ms", 10, 5000, "200",
          "How long an answer may take."),
     REAL(profile_framing, "quiet_ms", quiet_ms, "ms", 10, 5000, "350",
@@ -318,7 +321,9 @@ static const struct cfg_row laser_rows[] = {
     TEXTS(profile_laser, "off", off, off_count,
           "OFF, sent as it stands, in turn until it is read back; it begins with a terminator."),
     ASKS(profile_laser, "off_asks", off_asks, "What \"is_off\" needs."),
-    TEXT(profile_laser, "is_off", is_off, "", "Condition: no light, and none on its way."),
+    TEXT(profile_laser, "is_off", is_off, "",
+         "Condition: no light, and none on its way. Each term speaks of one value, a "
+         "word, a whole number, or bits that are missing: more the guard cannot see."),
     GROUPS(profile_laser, "faults", faults, faults_count, code_rows, "What fault codes mean."),
     GROUP(profile_laser, "keepalive", keepalive, keepalive_rows,
           "Sent while emission is on, never else."),

@@ -57,7 +57,7 @@ static struct part read_value(const struct profile *p, const char *at, struct go
     if (inside == 0)
         return part;
     if (size < inside && !read_format(at + 1 + size + 1, inside - size - 1, &part))
-        return bad(err, "not a format", at);
+        return bad(err, "not a format (0, width, .digits, one of d x X f e g s; no + or -)", at);
     snprintf(name, sizeof name, "%.*s", (int)size, at + 1);
     part.value = size < sizeof name ? profile_value(p, name) : -1;
     return part.value >= 0 ? part : bad(err, "there is no such value", at);

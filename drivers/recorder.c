@@ -79,7 +79,7 @@ int recorder_open(const struct profile *p, const char *link, int unit, struct cl
     r->p = p;
     r->clk = clk;
     r->sink = sink;
-    r->maker = (struct golden_maker){p, wire, unit, r->source};
+    r->maker = (struct golden_maker){p, wire, unit, r->source, strncmp(link, "usbtmc:", 7) == 0};
     capture_begin(&r->capture);
     say_source(r, "an instrument that has not said who it is");
     int rc = open_link(r, link, unit, cancel, err);

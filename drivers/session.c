@@ -86,6 +86,8 @@ int session_reopen(struct session *s, struct gon_error *err)
 {
     profile_data_clear(&s->data);
     s->restarted = false;
+    if (s->ops->forget)
+        s->ops->forget(s);
     return s->ops->reopen(s, err);
 }
 

@@ -26,14 +26,15 @@ struct transport;
 // The profile is borrowed for the session's life. Opens the link only and sends nothing.
 int session_open(const struct profile *p, const char *link, struct clk *clk,
                  const struct cancel *cancel, struct session **ret_session, struct gon_error *err);
-// The same over a transport that is open; takes it over, also when it fails.
-int session_on_transport(const struct profile *p, struct transport *transport,
-                         struct session **ret_session, struct gon_error *err);
+// Over a transport that is open, which is taken over, also when it fails.
+int session_over(const struct profile *p, struct transport *transport,
+                 struct session **ret_session, struct gon_error *err);
 // Over a bus, which is borrowed. NULL without memory.
 struct session *session_on_bus(const struct profile *p, struct bus *bus, int unit);
 void session_free(struct session *s);
-int session_reopen(struct session *s,
-                   struct gon_error *err); // of a bus: nothing, its owner does it
+// Whatever was learnt of the instrument is forgotten, as another one may be there. Of a bus:
+// nothing is opened, its owner does it.
+int session_reopen(struct session *s, struct gon_error *err);
 
 const struct profile *session_profile(const struct session *s);
 const char *session_link(const struct session *s);

@@ -266,8 +266,8 @@ static int check_protocol(const struct profile *p, const char *link, struct gon_
     return 0;
 }
 
-int session_on_transport(const struct profile *p, struct transport *transport,
-                         struct session **ret_session, struct gon_error *err)
+int session_over(const struct profile *p, struct transport *transport,
+                 struct session **ret_session, struct gon_error *err)
 {
     static const struct session_ops ops = {
         text_ask,    text_send, text_send_blind, text_reopen,
@@ -296,5 +296,5 @@ int session_open(const struct profile *p, const char *link, struct clk *clk,
     int rc = check_protocol(p, link, err);
     if (rc == 0)
         rc = transport_open(link, clk, cancel, &transport, err);
-    return rc < 0 ? rc : session_on_transport(p, transport, ret_session, err);
+    return rc < 0 ? rc : session_over(p, transport, ret_session, err);
 }

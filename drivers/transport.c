@@ -6,8 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Without its kind yet; NULL without memory.
-static struct transport *create(const struct link *link, const char *text, struct clk *clk,
+struct transport *transport_new(const struct link *link, const char *text, struct clk *clk,
                                 const struct cancel *cancel)
 {
     struct transport *t = calloc(1, sizeof *t);
@@ -26,9 +25,8 @@ static struct transport *create(const struct link *link, const char *text, struc
     return t;
 }
 
-// Opens what is complete, or takes it apart.
-static int finish(struct transport *t, int rc, struct transport **ret_transport,
-                  struct gon_error *err)
+int transport_finish(struct transport *t, int rc, struct transport **ret_transport,
+                     struct gon_error *err)
 {
     if (rc == 0)
         rc = t->ops->open(t, err);
@@ -44,13 +42,13 @@ int transport_open_parsed(const struct link *link, const char *text, struct clk 
                           const struct cancel *cancel, struct transport **ret_transport,
                           struct gon_error *err)
 {
-    struct transport *t = create(link, text, clk, cancel);
+    struct transport *t = transport_new(link, text, clk, cancel);
     if (!t)
         return gon_fail(err, GON_E_SYSTEM, "%s: out of memory", text);
     int rc = 0;
     if (link->kind == LINK_USBTMC)
         rc = transport_usbtmc_attach(t, transport_usb_new(&t->link, t->text, clk), err);
-    return finish(t, rc, ret_transport, err);
+    return transport_finish(t, rc, ret_transport, err);
 }
 
 int transport_open_usb_io(struct usb_io *io, const char *link, struct clk *clk,
@@ -59,12 +57,12 @@ int transport_open_usb_io(struct usb_io *io, const char *link, struct clk *clk,
 {
     struct link parsed;
     int rc = link_parse(link, LINK_TEXT, &parsed, err);
-    struct transport *t = rc == 0 ? create(&parsed, link, clk, cancel) : NULL;
+    struct transport *t = rc == 0 ? transport_new(&parsed, link, clk, cancel) : NULL;
     if (!t) {
         io->ops->free(io);
         return rc < 0 ? rc : gon_fail(err, GON_E_SYSTEM, "%s: out of memory", link);
     }
-    return finish(t, transport_usbtmc_attach(t, io, err), ret_transport, err);
+    return transport_finish(t, transport_usbtmc_attach(t, io, err), ret_transport, err);
 }
 
 int transport_open(const char *link, struct clk *clk, const struct cancel *cancel,

@@ -4,6 +4,8 @@
 //
 //   serial:/dev/serial/by-id/usb-...?baud=115200&parity=N&stop=1
 //                   over libserialport; termios where it refuses (ptys)
+//   serial:usb-VID:PID:SERIAL?baud=...
+//                   the same, by the numbers of the USB adapter, looked for at each opening
 //   tcp:host:port   as ser2net and serial servers give
 //   usbtmc:VID:PID:SERIAL
 //                   over libusb; without SERIAL the only device with these numbers

@@ -13,7 +13,10 @@
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
+#include <time.h>
 #include <unistd.h>
+
+enum { OWN_NAP_MS = 20, OWN_NAPS = 9 };
 
 // The pid that holds a flock on this file, by /proc/locks, which shows the locks of all users:
 // "1: FLOCK  ADVISORY  WRITE 1234 00:05:678 0 EOF". 0: none found.
@@ -90,14 +93,30 @@ static int say_in_use(const char *path, const struct stat *file, struct gon_erro
                     pid, comm[0] ? " (" : "", comm, comm[0] ? ")" : "");
 }
 
+// A port that we closed a moment ago can still be locked by us: somebody else's look into
+// /proc/PID/fd keeps it open until that is over.
+static int take_lock(int fd)
+{
+    const struct timespec nap = {0, OWN_NAP_MS * 1000000};
+    struct stat s;
+    for (int k = 0; flock(fd, LOCK_EX | LOCK_NB) < 0; k++) {
+        const int error = errno;
+        if (error != EWOULDBLOCK || k == OWN_NAPS || fstat(fd, &s) < 0 ||
+            lock_holder(&s) != getpid())
+            return error;
+        nanosleep(&nap, NULL);
+    }
+    return 0;
+}
+
 int transport_claim(int fd, const char *path, struct gon_error *err)
 {
     struct stat s;
-    if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+    const int error = take_lock(fd);
+    if (!error) {
         ioctl(fd, TIOCEXCL);
         return 0;
     }
-    int error = errno;
     if (error == EWOULDBLOCK && fstat(fd, &s) == 0)
         return say_in_use(path, &s, err);
     return gon_fail(err, GON_E_SYSTEM, "%s: cannot be locked: %s", path, strerror(error));

@@ -11,6 +11,7 @@
 #define TRANSPORT_SLICE_NS CLK_MS(50) // the longest wait without a turn of the clock
 #define TRANSPORT_BABBLE_NS CLK_S(2)  // a line that is not silent by then says nothing useful
 
+struct guard_link;
 struct serial_port;
 struct usb_link;
 
@@ -39,9 +40,18 @@ struct transport {
     struct serial_port *serial; // NULL: TCP, or closed
     int fd;                     // -1: closed, or USB
     struct usb_link *usb;
+    struct guard_link *guard; // NULL: no guard process has it
+    bool shut;                // with one: hung up or not opened yet
 };
 
 extern const struct transport_ops transport_stream_ops, transport_usbtmc_ops;
+
+// One of a kind that is to be set (a stream, so far); NULL without memory. finish opens what is
+// complete, or takes it apart, also with an rc that failed before.
+struct transport *transport_new(const struct link *link, const char *text, struct clk *clk,
+                                const struct cancel *cancel);
+int transport_finish(struct transport *t, int rc, struct transport **ret_transport,
+                     struct gon_error *err);
 
 // A line that never falls silent must not take the clock's turn away.
 void transport_take_turn(struct transport *t);

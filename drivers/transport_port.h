@@ -13,8 +13,9 @@
 struct serial_port;
 
 // Opens, locks and configures. A path may be a symbolic link (by-id): it is resolved lexically,
-// because libserialport 0.1.1 knows only names directly in /dev. GON_E_REFUSED: in use; GON_E_GONE:
-// not there.
+// because libserialport 0.1.1 knows only names directly in /dev. The numbers of a USB adapter are
+// looked for among those that are plugged in now. GON_E_REFUSED: in use; GON_E_GONE: not there;
+// GON_E_INPUT: several adapters are alike.
 int transport_serial_open(const struct link *link, struct serial_port **ret_port,
                           struct gon_error *err);
 void transport_serial_close(struct serial_port *p);

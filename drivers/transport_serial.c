@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/transport_port.h"
 
+#include "drivers/transport_adapter.h"
 #include "drivers/transport_claim.h"
 
 #include <errno.h>
@@ -173,14 +174,20 @@ static int configure(const struct serial_port *p, const struct link *l)
 static int open_port(const struct link *link, struct serial_port *p, struct gon_error *err)
 {
     char name[PATH_MAX];
-    resolve(link->place, name);
+    int rc = 0;
+    if (link->adapter)
+        rc = transport_adapter_find(link, name, sizeof name, err);
+    else
+        resolve(link->place, name);
+    if (rc < 0)
+        return rc;
     errno = 0;
     int error = library_open(name, p);
     if (error == ENOTTY)
         error = plain_open(name, p);
     if (error)
         return transport_claim_failed(link->place, name, error, err);
-    int rc = transport_claim(p->fd, link->place, err);
+    rc = transport_claim(p->fd, link->place, err);
     if (rc < 0)
         return rc;
     error = configure(p, link);

@@ -194,7 +194,11 @@ static void command(struct sim_cobolt_port *p, const char *line, int64_t t_ns)
     if (*line == 0)
         return;
     p->port.frames_in++;
-    if (c->last_ns != INT64_MIN && t_ns - c->last_ns < SIM_COBOLT_GAP_NS) {
+    const bool too_early = c->last_ns != INT64_MIN && t_ns - c->last_ns < SIM_COBOLT_GAP_NS;
+    struct sim_cobolt_heard *h = &c->heard[c->heard_count++ % SIM_COBOLT_HEARD];
+    *h = (struct sim_cobolt_heard){.t_ns = t_ns, .too_early = too_early};
+    snprintf(h->text, sizeof h->text, "%s", line);
+    if (too_early) {
         c->too_early++;
         return;
     }

@@ -19,6 +19,14 @@
 
 #define SIM_COBOLT_GAP_NS 100000000
 
+enum { SIM_COBOLT_HEARD = 64 };
+
+struct sim_cobolt_heard { // one command, as it came over the wire
+    int64_t t_ns;
+    bool too_early; // and was ignored
+    char text[24];
+};
+
 struct sim_cobolt { // the laser's controller, shared by its ports
     struct world *world;
     int64_t reply_ns; // its time to answer
@@ -26,6 +34,8 @@ struct sim_cobolt { // the laser's controller, shared by its ports
     bool echo;
     uint64_t too_early; // commands ignored
     double hours;
+    uint64_t heard_count; // all of them; the newest are kept, each at its number % SIM_COBOLT_HEARD
+    struct sim_cobolt_heard heard[SIM_COBOLT_HEARD];
 };
 
 struct sim_cobolt_port {

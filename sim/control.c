@@ -67,6 +67,20 @@ static void do_state(struct request *r)
     json_object_set_new(r->out, "wires", request_wires(r));
 }
 
+// What came over the laser's wires, oldest first.
+static void do_heard(struct request *r)
+{
+    const struct sim_cobolt *c = &the(r)->laser;
+    json_t *all = json_array();
+    uint64_t i = c->heard_count > SIM_COBOLT_HEARD ? c->heard_count - SIM_COBOLT_HEARD : 0;
+    for (; i < c->heard_count; i++) {
+        const struct sim_cobolt_heard *h = &c->heard[i % SIM_COBOLT_HEARD];
+        json_array_append_new(all, json_pack("{s:I,s:s,s:b}", "t_ns", (json_int_t)h->t_ns, "text",
+                                             h->text, "too_early", h->too_early));
+    }
+    json_object_set_new(r->out, "heard", all);
+}
+
 static void do_truth(struct request *r)
 {
     const struct world_spec *w = &the(r)->world.spec;
@@ -217,6 +231,7 @@ char *control_answer(struct bench *bench, struct wire *wires, const char *line, 
     static const struct request_verb verbs[] = {{"state", do_state},
                                                 {"truth", do_truth},
                                                 {"values", do_values},
+                                                {"heard", do_heard},
                                                 {"plug", request_plug},
                                                 {"unplug", request_unplug},
                                                 {"mute", request_mute},

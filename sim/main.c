@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // goniosim: the simulated bench on real wires, or one instrument made from its profile.
 #include "base/options.h"
+#include "base/standard.h"
 #include "sim/actor_served.h"
 #include "sim/bench_served.h"
 #include "sim/profiles.h"
@@ -201,6 +202,7 @@ int main(int argc, char **argv)
     struct gon_error err = {.text = ""};
     struct arguments a = {.seed = -1, .unit = 1};
     const char *operands[1];
+    standard_hold();
     argc = take_sets(argc, argv, &a, &err);
     int rc = argc < 0 ? argc : options_take(argc, argv, rows, &a, operands, 0, &err);
     if (rc < 0)

@@ -187,7 +187,7 @@ static inline struct links_tally links_measure_usb(const struct links_policy *p,
     struct links_tally t = {.reads = reads};
     struct session *session;
     struct clk *clk = &u.usb.clk.clk;
-    if (session_on_transport(p->profile, links_begin_usb(&u, p->profile, seed), &session, NULL) < 0)
+    if (session_over(p->profile, links_begin_usb(&u, p->profile, seed), &session, NULL) < 0)
         exit(1);
     links_begin_session(session, p);
     for (int i = 0; i < reads; i++) {

@@ -58,12 +58,12 @@ def wait_for(true, patience_s=PATIENCE_S):
 class Program:
     """A program whose standard output is read line by line; standard error goes to a file."""
 
-    def __init__(self, argv, log, env=None, stdin=None):
+    def __init__(self, argv, log, env=None, stdin=None, cwd=None):
         self.log = pathlib.Path(log)
         self.argv = [str(a) for a in argv]
         with open(self.log, "ab") as err:
             self.process = subprocess.Popen(self.argv, stdin=stdin, stdout=subprocess.PIPE, stderr=err,
-                                            text=True, env={**os.environ, **(env or {})})
+                                            text=True, cwd=cwd, env={**os.environ, **(env or {})})
         self.pid = self.process.pid
         self.lines = queue.Queue()
         self.said = []
@@ -126,9 +126,10 @@ class Stream:
         self.response = self.connection.getresponse()
         self.seen = []
 
-    def next(self):
+    def next(self, end=float("inf")):
+        """The next event, before the time end: pings alone keep the connection for ever."""
         data = None
-        while True:
+        while time.monotonic() < end:
             line = self.response.readline().decode()
             if not line:
                 raise AssertionError(f"the event stream ended; seen {self.seen[-5:]}")
@@ -137,12 +138,13 @@ class Stream:
             elif line == "\n" and data is not None:
                 self.seen.append(data)
                 return data
+        raise AssertionError(f"no event; last events {self.seen[-5:]}")
 
     def until(self, wanted, patience_s=PATIENCE_S):
         """The first event for which wanted(event) is true."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end:
-            event = self.next()
+            event = self.next(end)
             if wanted(event):
                 return event
         raise AssertionError(f"not within {patience_s} s; last events {self.seen[-5:]}")
@@ -195,8 +197,10 @@ def short_folder(of):
 class Daemon(Program):
     """goniod with its socket and campaigns in a folder; bench: arguments that name it."""
     wrap = ()  # what runs it
+    made = []  # all of them, until their guards are known to be gone
 
     def __init__(self, folder, *bench, env=None, ready=True):
+        Daemon.made.append(self)
         self.folder = pathlib.Path(folder)
         self.directory = self.folder / "campaigns"
         self.runtime = short_folder(self.folder)  # --sim makes its run directory here
@@ -239,6 +243,23 @@ class Daemon(Program):
     def follow(self, last_id=None):
         return Stream(self.socket, last_id)
 
+    def stop_socket(self):
+        return self.runtime / "goniod-guard.sock"
+
+    def guard_pid(self):
+        """Of the process behind the STOP socket, without connecting to it, which would mean OFF; None: there is none."""
+        inodes = {line.split()[6] for line in pathlib.Path("/proc/net/unix").read_text().splitlines()[1:]
+                  if line.endswith(f" {self.stop_socket()}")}
+        for process in pathlib.Path("/proc").glob("[0-9]*") if inodes else ():
+            try:
+                if (process / "comm").read_text() != "gonio-guard\n":
+                    continue
+                if inodes & {os.readlink(fd)[len("socket:["):-1] for fd in (process / "fd").iterdir()}:
+                    return int(process.name)
+            except OSError:
+                continue
+        return None
+
     def sim_folder(self):
         """The run directory of the simulator that --sim started."""
         (folder,) = self.runtime.glob("goniosim-*")
@@ -255,7 +276,8 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None, **kwargs):
                           env={**os.environ, "NO_COLOR": "", **(env or {})}, **kwargs)
 
 
-LONGEST = ["test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_safety", "test_daemon"]
+LONGEST = ["test_guard", "test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_replug",
+           "test_safety", "test_daemon"]
 
 
 def pytest_collection_modifyitems(items):
@@ -273,6 +295,17 @@ def pytest_collection_modifyitems(items):
         dealt += [leader, *short[:run - 1]]
         del short[:run - 1]
     items[:] = dealt + others + short
+
+
+@pytest.fixture(autouse=True)
+def no_guard_stays():
+    """A guard tries for ever to switch a laser off that it does not reach: here those are simulators that ended."""
+    yield
+    for d in [d for d in Daemon.made if d.process.poll() is not None]:
+        Daemon.made.remove(d)
+        pid = d.guard_pid()
+        if pid:
+            os.kill(pid, signal.SIGKILL)
 
 
 @pytest.fixture

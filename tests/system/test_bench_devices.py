@@ -261,3 +261,19 @@ def test_gonio_check_looks_into_the_profiles(tmp_path, was, becomes, says):
     assert gonio("check", right).returncode == 0
     done = gonio("check", wrong)
     assert done.returncode == 2 and re.search(says, done.stderr), done.stderr
+
+
+def test_a_shutter_has_to_have_a_safe_position(tmp_path):
+    profile = (ROOT / "configs" / "profiles" / "thorlabs-sc10.cfg").read_text()
+    (tmp_path / "sc10.cfg").write_text(profile.replace('safe = "closed";', ""))
+    shutter = '\ndevices: ( { name = "shutter"; driver = "./sc10.cfg"; link = "serial:/dev/s?baud=9600"; ' \
+              'use = "shutter"; position = "open"; } );\n'
+    bench = tmp_path / "bench.cfg"
+    text = (ROOT / "configs" / "goniod.cfg").read_text()
+    bench.write_text(text + shutter)
+    done = gonio("check", bench)
+    assert done.returncode == 2, done.stderr
+    assert "devices[0].safe: missing: profile thorlabs-sc10 does not say where it is safe" in done.stderr
+    for right in ('use = "shutter"; safe = "closed"', 'use = "other"'):
+        bench.write_text(text + shutter.replace('use = "shutter"', right))
+        assert gonio("check", bench).returncode == 0

@@ -43,7 +43,7 @@ def test_profiles_are_kept_in_the_file(daemon):
     table = [line.split("\t") for line in daemon.gonio("show", file, "--profiles").stdout.splitlines()]
     assert table[0] == ["id", "since", "role", "name", "bytes"]
     assert [row[3] for row in table[1:]] == ["cobolt-05", "sr830", "oriental-az"]
-    assert query(file, "pragma user_version") == [(3,)]
+    assert query(file, "pragma user_version") == [(4,)]
     missing = daemon.gonio("show", file, "--profile", "sr860")
     assert missing.returncode == 2 and "keeps no profile 'sr860'" in missing.stderr
 

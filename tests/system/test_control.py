@@ -8,6 +8,9 @@ import pytest
 from conftest import SMALL
 
 
+NO_NAMES = ["x" * 65, "a%0Ab", "a%00b", "%1B[31m", "a" * 5000, "%FF%FE", "%C3%28", "%ED%A0%80"]
+
+
 @pytest.fixture
 def two(start_daemon):
     """A daemon, and its command as two people."""
@@ -52,10 +55,17 @@ def test_commands_of_others_are_refused(two, tmp_path):
     assert json.loads(anne("control", "--json").stdout) == {"control": None}
 
 
-@pytest.mark.parametrize("name", ["x" * 65, "a%0Ab", "a%00b", "%1B[31m", "a" * 5000])
+@pytest.mark.parametrize("name", NO_NAMES)
 def test_what_is_no_name_is_refused(daemon, name):
     status, reply = daemon.request("POST", "/api/v1/control", {"do": "take"}, {"Gonio-Name": name})
     assert status == 400 and "Gonio-Name" in json.dumps(reply), reply
+    assert daemon.status()["control"] is None
+
+
+@pytest.mark.parametrize("name", NO_NAMES)
+def test_a_stop_needs_no_name(daemon, name):
+    status, reply = daemon.request("POST", "/api/v1/stop", headers={"Gonio-Name": name})
+    assert status == 200 and reply["laser_off"], reply
 
 
 def test_hostile_names_and_bodies(daemon):

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from conftest import BUILD, PATIENCE_S, QUICK_LASER, SMALL, Program, query
+from conftest import BUILD, PATIENCE_S, QUICK_LASER, SMALL, Daemon, Program, query
 
 TINY = """\
 campaign: {
@@ -353,3 +353,19 @@ def test_too_few_descriptors_are_refused_and_few_are_raised(tmp_path):
     assert few.returncode == 1 and "only 64 open files are allowed, 128 are needed" in few.stderr, few
     raised = limited(16, 256)
     assert raised.returncode == 2 and "no.cfg:1" in raised.stderr, raised  # as far as its bench
+
+
+class Closed(Daemon):
+    wrap = ("/bin/sh", "-c", 'exec "$@" <&- 2>&-', "sh")
+
+
+def test_what_is_said_on_a_closed_standard_error_goes_nowhere(start_sim, tmp_path):
+    sim = start_sim("--fast")
+    d = Closed(tmp_path / "d", "--config", sim.folder / "goniod.cfg", "--log", "debug")
+    try:
+        for fd in (0, 2):
+            assert os.readlink(f"/proc/{d.pid}/fd/{fd}") == "/dev/null"
+        for lock in (d.directory / ".goniod.lock", d.socket.with_name(d.socket.name + ".lock")):
+            assert "Z " not in lock.read_text(), "a line of the log"
+    finally:
+        assert d.end() == 0

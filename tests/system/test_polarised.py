@@ -50,7 +50,7 @@ def test_s_and_p_light_give_n_and_k_from_plan_to_fit(start_sim, start_daemon, tm
     assert [tuple(r) for r in rows] == CHANNELS
     beams = query(file, "SELECT sweep, pol_in, pol_out FROM plan WHERE kind = 'beam' ORDER BY sweep, point")
     assert [tuple(r) for r in beams] == [(0, "s", "u"), (0, "p", "u"), (4, "s", "u"), (4, "p", "u")]
-    assert query(file, "PRAGMA user_version")[0][0] == 2
+    assert query(file, "PRAGMA user_version")[0][0] == 4
     axes = sim.control(do="state")["axes"]
     assert axes["polariser"]["moves"] > 0 and axes["analyser"]["moves"] > 0
 

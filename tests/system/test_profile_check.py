@@ -56,6 +56,7 @@ def test_a_mistake_is_told_with_its_line(tmp_path):
 def test_an_unknown_profile_is_told_where_it_was_looked_for():
     r = gonio("profile", "check", "nobody")
     assert r.returncode == 2 and "no profile 'nobody': looked for " in r.stderr
+    assert "given as a path: ./NAME.cfg" in r.stderr
 
 
 def test_a_page_keeps_its_table(tmp_path):
@@ -132,3 +133,16 @@ def test_what_was_recorded_is_told(tmp_path):
 def test_settings_are_the_manuals():
     r = gonio("profile", "settings")  # a star in them is no beginning of bold
     assert r.returncode == 0 and "*values[].shares*: text" in r.stdout and "like this (\\* and ? as" in r.stdout
+
+
+def test_a_laser_that_the_guard_cannot_see_off_is_refused(tmp_path):
+    text = (ROOT / "configs/profiles/cobolt-05.cfg").read_text()
+    good = gonio("profile", "check", ROOT / "configs/profiles/cobolt-05.cfg")
+    assert good.returncode == 0 and "guard       can switch it off and see it" in good.stdout, good
+    is_off = 'is_off = "emission = 0 and mode != 1 and mode != 2 and mode != 3"'
+    assert is_off in text
+    bad = tmp_path / "bad.cfg"
+    bad.write_text(text.replace(is_off, 'is_off = "power_w < 0.001"').replace('off_asks = ( "emission", "mode" )',
+                                                                            'off_asks = ( "power" )'))
+    r = gonio("profile", "check", bad)
+    assert r.returncode == 2 and "power_w" in r.stderr and "guard" in r.stderr, r

@@ -250,6 +250,29 @@ def test_lines_are_run_one_after_another(start_sim, tmp_path):
     assert re.findall(r'does = "(\w+)"', r.stdout) == ["model", "x"]
 
 
+@pytest.mark.parametrize("line, says", [("x" + " " * 600 + "y\n", "longer than 511 bytes"), ("x\0y\n", "zero byte"),
+                                        ("set: x = " + "0" * 600 + "7\n", "longer than 511 bytes")])
+def test_a_line_is_not_done_in_part(start_sim, tmp_path, line, says):
+    meter = written(tmp_path)
+    sim = start_sim("--profile", meter)
+    r = gonio("profile", "record", meter, link_to(sim, "meter"), "--interactive", stdin=line)
+    assert r.returncode == 2 and says in r.stderr and entries(r.stdout) == 1, r
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_an_input_that_cannot_be_read_is_said(start_sim, tmp_path, closed):
+    meter = written(tmp_path)
+    sim = start_sim("--profile", meter)
+    argv = [BUILD / "gonio", "profile", "record", meter, link_to(sim, "meter"), "--interactive"]
+    folder = os.open(tmp_path, os.O_RDONLY)
+    try:
+        r = subprocess.run(argv, stdin=folder, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+                           preexec_fn=(lambda: os.close(0)) if closed else None)
+    finally:
+        os.close(folder)
+    assert r.returncode == 2 and "standard input: " in r.stderr, r.stderr
+
+
 def test_a_line_is_recorded_when_it_was_typed(start_sim, tmp_path):
     meter = written(tmp_path)
     sim = start_sim("--profile", meter)
@@ -267,6 +290,9 @@ def test_a_line_is_recorded_when_it_was_typed(start_sim, tmp_path):
 
 
 # --- what goes wrong --------------------------------------------------------------------------------
+
+
+HANG_UP = b"<hangs up>"
 
 
 class Instrument:
@@ -294,7 +320,9 @@ class Instrument:
                 if answer == b"":
                     return
                 if answer:
-                    c.sendall(answer)
+                    c.sendall(answer.removesuffix(HANG_UP))
+                    if answer.endswith(HANG_UP):
+                        return
 
 
 GOOD = {b"WHO?": b"Meter 3\r\n", b"X?": b"1.500 V\r\n", b"G?": b"2\r\n"}
@@ -316,6 +344,16 @@ def test_a_failure_is_a_comment_with_what_came(tmp_path, answer, says):
     assert re.findall(r'does = "(\w+)"', r.stdout) == ["model", "gain"]
     check = gonio("profile", "check", pasted(meter, r.stdout, tmp_path / "p"))
     assert check.returncode == 0, check.stderr
+
+
+@pytest.mark.parametrize("answer", [b"1.5", b"1.500 V", b"1.500 V\r"])
+def test_an_answer_that_was_broken_off_is_no_entry(tmp_path, answer):
+    """Its beginning may fit the pattern, and is another number."""
+    meter = written(tmp_path)
+    r = gonio("profile", "record", meter, Instrument({**GOOD, b"X?": lambda: answer + HANG_UP}).link)
+    assert r.returncode == 1
+    assert re.findall(r'does = "(\w+)"', r.stdout) == ["model"], r.stdout
+    assert any("broken off" in c for c in comments(r.stdout)), r.stdout
 
 
 def test_a_retry_loses_nothing(tmp_path):

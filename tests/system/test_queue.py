@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The queue at the prompt and over HTTP: its order, what is held, and that it outlives goniod."""
 import json
+import queue
 import signal
+import sqlite3
+import threading
 import time
 
 import pytest
@@ -55,6 +58,36 @@ def test_order_and_estimates(busy):
     assert status == 400 and "hold, release, remove or move" in json.dumps(reply)
     assert busy.request("POST", "/api/v1/queue", {"run": 1})[0] == 400
     assert busy.request("POST", "/api/v1/queue", "[")[0] == 400
+
+
+@pytest.mark.parametrize("number", [0, -1, 2**31, 2**32, 2**32 + 2, 2**63 - 1])
+def test_a_number_that_is_no_runs_names_no_run(busy, number):
+    assert do(busy, "hold")[0] == 200
+    for wrong in ({"do": "release", "run": number}, {"do": "remove", "run": number},
+                  {"do": "move", "run": number, "place": 1}, {"do": "move", "run": 3, "place": number}):
+        status, reply = busy.request("POST", "/api/v1/queue", wrong)
+        assert status == 400, (wrong, reply)
+    q = queue_of(busy)
+    assert q["held"] and [x["run"] for x in q["entries"]] == busy.runs
+
+
+def test_a_change_is_answered_when_it_is_on_the_disk(busy):
+    """Killed after the answer, goniod starts anew with what it said. Another writer delays the disk here."""
+    a, b, c, e = busy.runs
+    db = sqlite3.connect(busy.directory / "state.db", isolation_level=None)
+    answers = queue.Queue()
+    changes = ({"do": "move", "run": e, "place": 1}, {"do": "hold", "run": c}, {"do": "remove", "run": b})
+    for change in changes:
+        db.execute("begin immediate")
+        threading.Thread(target=lambda: answers.put(busy.request("POST", "/api/v1/queue", change))).start()
+        with pytest.raises(queue.Empty):
+            answers.get(timeout=0.3)
+        assert busy.status()["state"], "nothing else waits"
+        db.execute("rollback")
+        assert answers.get(timeout=60)[0] == 200
+    busy.process.kill()
+    busy.process.wait()
+    assert db.execute("select run, held from queue order by place").fetchall() == [(a, 0), (e, 0), (c, 1)]
 
 
 def test_the_command(busy):

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """What goniod says of the laser is what was read back, and it ends within 5 s of SIGTERM whatever hangs."""
 import os
+import pty
 import signal
 import sqlite3
 import subprocess
+import termios
 import time
 
 import pytest
 
-from conftest import BUILD, ROOT, Daemon
+from conftest import BUILD, QUICK_LASER, ROOT, Daemon
 
 PLAN = """\
 campaign: {
@@ -32,6 +34,50 @@ def measuring(start_sim, start_daemon):
     assert sim.control(do="state")["laser"]["emission"]
     yield sim, daemon, reply, events
     os.kill(sim.pid, signal.SIGCONT)
+
+
+class Unread(Daemon):
+    """Its standard error is what nobody reads: a pipe, or a terminal where Ctrl-S was typed."""
+
+    def __init__(self, folder, kind, *bench):
+        if kind == "pipe":
+            self.error = folder / "stderr"
+            os.mkfifo(self.error)
+            self.ends = [os.open(self.error, os.O_RDWR | os.O_NONBLOCK)]
+        else:
+            master, slave = pty.openpty()
+            self.error = os.ttyname(slave)
+            self.ends = [os.open(self.error, os.O_RDWR | os.O_NONBLOCK | os.O_NOCTTY), slave, master]
+        self.wrap = ("/bin/sh", "-c", f'exec "$@" 2>{self.error}', "sh")
+        super().__init__(folder, *bench)
+
+    def stop_reading(self):
+        if len(self.ends) > 1:
+            termios.tcflow(self.ends[1], termios.TCOOFF)
+        try:
+            while True:
+                os.write(self.ends[0], b"x" * 1000)
+        except BlockingIOError:
+            pass
+
+
+@pytest.mark.parametrize("kind", ["pipe", "terminal"])
+def test_a_log_that_nobody_reads_holds_up_neither_a_stop_nor_the_end(start_sim, tmp_path, kind):
+    sim = start_sim("--fast", "--seed", "9", *QUICK_LASER)
+    (tmp_path / "d").mkdir()
+    d = Unread(tmp_path / "d", kind, "--config", sim.folder / "goniod.cfg")
+    try:
+        reply = d.submit(PLAN, "safety.cfg")
+        events = d.follow(0)
+        events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1)
+        d.stop_reading()
+        assert sim.control(do="state")["laser"]["emission"]
+        stopped = d.gonio("stop")
+        assert stopped.returncode == 0, stopped.stderr
+        assert not sim.control(do="state")["laser"]["emission"]
+        assert d.request("GET", f"/api/v1/runs/{reply['run']}")[1]["state"] == "stopped"
+    finally:
+        assert d.end() == 0
 
 
 def test_a_stop_never_says_off_of_a_laser_that_ignores_it(measuring):

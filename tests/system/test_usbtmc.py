@@ -1,90 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""USBTMC by the real libusb: a simulated power meter (tests/usb/usbsim) on nodes of umockdev, asked by
-gonio's own link (tests/usb/linkask) and by pyvisa-py, which knows nothing of gonio."""
+"""USBTMC by the real libusb: simulated power meters (tests/usb/usbsim) on nodes of umockdev, asked by gonio's own link
+(tests/usb/linkask), by gonio's driver, and by pyvisa-py, which knows nothing of gonio."""
 import os
 import re
-import shutil
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
-from conftest import BUILD, Program
+from conftest import BUILD, QUICK_LASER, ROOT, wait_for
+from mockbus import METER, PRELOAD, Usb, needs_umockdev, preload
 
-METER = "usbtmc:1313:8072"
 IDENTITY = "Thorlabs,PM100USB,P0000001,1.4.0"
-PRELOAD = "libumockdev-preload.so.0"
 
-pytestmark = pytest.mark.skipif(not shutil.which("umockdev-wrapper") or not (BUILD / "tests/usbsim").exists(),
-                                reason="umockdev is not installed")
-
-
-def preload(program):
-    """What umockdev-wrapper sets; a program with AddressSanitizer wants that before all others."""
-    needs = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
-    asan = re.search(r"=> (\S*libasan\S*)", needs)
-    return f"{asan.group(1)} {PRELOAD}" if asan else PRELOAD
-
-
-class Dialogue(Program):
-    """A program that answers each line with a line."""
-
-    def __init__(self, argv, log, env):
-        super().__init__(argv, log, env={"LD_PRELOAD": preload(argv[0]), **env}, stdin=subprocess.PIPE)
-
-    def say(self, line):
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
-
-    def hear(self):
-        return self.wait_line("")
-
-    def ask(self, line):
-        self.say(line)
-        return self.hear()
-
-    def close(self):
-        self.process.stdin.close()
-        return self.process.wait(10)
-
-
-class Usb:
-    """The simulated bus and whoever asks on it."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        self.simulator = Dialogue([BUILD / "tests/usbsim"], folder / "usbsim.log", {})
-        self.env = {"UMOCKDEV_DIR": self.simulator.wait_line("dir ")[4:]}
-        self.clients = []
-
-    def tell(self, line):
-        said = self.simulator.ask(line)
-        assert said.startswith("ok"), f"{line}: {said}"
-        return said[3:]
-
-    def seen(self, request):
-        return int(self.tell(f"seen 0 {request}"))
-
-    def link(self, text=METER):
-        """The client and what it said when it opened the link."""
-        client = Dialogue([BUILD / "tests/linkask", text], self.folder / "linkask.log", self.env)
-        said = client.hear()
-        if said.startswith("ok open"):
-            self.clients.append(client)
-        else:
-            assert client.process.wait(10) == 1
-        return client, said
-
-    def open(self, text=METER):
-        client, said = self.link(text)
-        assert said.startswith("ok open"), said
-        return client
-
-    def close(self):
-        for client in self.clients:
-            if client.process.poll() is None:
-                assert client.close() == 0, client.errors()
-        assert self.simulator.close() == 0, self.simulator.errors()
+pytestmark = needs_umockdev
 
 
 @pytest.fixture
@@ -271,26 +202,137 @@ def test_nothing_there_is_said(usb):
     assert said.startswith("error gone ") and "is it plugged in and switched on?" in said, said
 
 
-PEER = """
-import sys, pyvisa
-meter = pyvisa.ResourceManager("@py").open_resource(sys.argv[1])
-meter.timeout = 2000
-print(meter.query("*IDN?").strip())
-meter.write("SENS:CORR:WAV 633")
-print(float(meter.query("SENS:CORR:WAV?")))
-for i in range(3):
-    print(round((float(meter.query("MEAS:POW?")) - 1e-3) * 1e9))
-meter.write("LONG? 5000")
-print(len(meter.read_raw()))
-meter.close()
-"""
-
-
-def test_an_independent_peer_understands_the_device(usb):
-    pytest.importorskip("pyvisa_py")
-    usb.tell("plug 0 1 2")
-    peer = subprocess.run([sys.executable, "-c", PEER, "USB0::0x1313::0x8072::P0000001::INSTR"],
+def ask_as_pyvisa(usb, resource, *lines):
+    """What a program of these lines prints; meter is what pyvisa-py opened."""
+    if not os.environ.get("CI"):
+        pytest.importorskip("pyvisa_py")
+    program = ["import sys, pyvisa", 'meter = pyvisa.ResourceManager("@py").open_resource(sys.argv[1])',
+               "meter.timeout = 2000", *lines, "meter.close()"]
+    peer = subprocess.run([sys.executable, "-c", "\n".join(program), resource],
                           env={**os.environ, **usb.env, "LD_PRELOAD": PRELOAD}, timeout=30,
                           capture_output=True, text=True, check=False)
     assert peer.returncode == 0, peer.stderr
-    assert peer.stdout.split("\n")[:-1] == [IDENTITY, "633.0", "1", "2", "3", "5000"]
+    return peer.stdout.split("\n")[:-1]
+
+
+def test_an_independent_peer_understands_the_device(usb):
+    usb.tell("plug 0 1 2")
+    assert ask_as_pyvisa(usb, "USB0::0x1313::0x8072::P0000001::INSTR",
+                         'print(meter.query("*IDN?").strip())',
+                         'meter.write("SENS:CORR:WAV 633")',
+                         'print(float(meter.query("SENS:CORR:WAV?")))',
+                         'for i in range(3): print(round((float(meter.query("MEAS:POW?")) - 1e-3) * 1e9))',
+                         'meter.write("LONG? 5000")',
+                         'print(len(meter.read_raw()))') == [IDENTITY, "633.0", "1", "2", "3", "5000"]
+
+
+# --- the meter that is made from its profile -------------------------------------------------------
+
+PROFILED = "Thorlabs,PM100D,P0012345,2.4.0"
+
+
+@pytest.fixture
+def profiled(usb):
+    """What `gonio profile sim thorlabs-pm100` serves, plugged in at the link that the profile names."""
+    device = usb.tell(f"profile {ROOT}/configs/profiles/thorlabs-pm100.cfg")
+    usb.tell(f"plug {device} 1 5")
+    return device
+
+
+def test_pyvisa_reads_and_sets_the_meter_made_from_its_profile(usb, profiled):
+    usb.tell(f"set {profiled} power_w = 0.00025")
+    assert ask_as_pyvisa(usb, "USB0::0x1313::0x8078::P0012345::INSTR",
+                         r'meter.write_termination = "\n"',  # as the profile says
+                         'print(meter.query("*IDN?").strip())',
+                         'print(meter.query("SYST:SENS:IDN?").strip())',
+                         'print(float(meter.query("READ?")))',
+                         'meter.write("SENS:CORR:WAV 1310")',
+                         'print(float(meter.query("SENS:CORR:WAV?")))',
+                         'print(meter.query("SYST:ERR?").strip())',
+                         'meter.write("WHAT IS THIS")',
+                         'print(meter.query("SYST:ERR?").strip())',
+                         'print(meter.query("SYST:ERR?").strip())') == [
+        PROFILED, "S132C,210101,01-JAN-2026,1,2,33", "0.00025", "1310.0", '0,"No error"',
+        '-113,"Undefined header"', '0,"No error"']
+
+
+def test_gonios_driver_reads_the_meter_made_from_its_profile(usb, profiled, start_sim, start_daemon, tmp_path):
+    usb.tell(f"set {profiled} power_w = 0.00025")
+    sim = start_sim("--fast", *QUICK_LASER)
+    bench = tmp_path / "goniod.cfg"
+    text, count = re.subn(r'(detector: \{[^}]*?driver = )"\w+"(.*?link = )"[^"]*"',
+                          r'\1"thorlabs-pm100"\2"usbtmc:1313:8078:P0012345"',
+                          (sim.folder / "goniod-tcp.cfg").read_text(), flags=re.S)
+    assert count == 1
+    bench.write_text(re.sub(r"monitor_aux = \d", "monitor_aux = 0", text))
+    daemon = start_daemon("--config", bench, env={**usb.env, "LD_PRELOAD": preload(BUILD / "goniod")})
+
+    def seen():
+        return next(d for d in daemon.status()["devices"] if d["name"] == "detector")
+
+    assert seen()["link"] == "ok", seen()
+    assert seen()["identity"] == "Thorlabs PM100D, serial P0012345, head S132C 210101"
+    wait_for(lambda: seen()["signal_v"] == 0.00025)
+    usb.tell(f"set {profiled} power_w = 0.0005")
+    wait_for(lambda: seen()["signal_v"] == 0.0005)
+    assert ask_errors(daemon) == {}
+
+
+def ask_errors(daemon):
+    """What went wrong on the detector's link, by kind."""
+    status, reply = daemon.request("GET", "/api/v1/devices")
+    assert status == 200
+    (detector,) = [d for d in reply["devices"] if d["kind"] == "detector"]
+    return {kind: n for kind, n in detector["traffic"]["errors"].items() if n}
+
+
+# --- through a guard process -----------------------------------------------------------------------
+
+def wavelength_nm(client):
+    return round(float(re.match(r"ok (\S+) \(", client.ask("ask SENS:CORR:WAV?")).group(1)))
+
+
+def reads_1234(usb):
+    """What the meter is set to, by a client of its own, as soon as the guard has let it go."""
+    client, said = usb.link()
+    return said.startswith("ok open") and wavelength_nm(client) == 1234
+
+
+def test_over_usb_a_guard_lets_questions_and_answers_pass(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert wavelength_nm(meter) == 1234  # its first bytes were OFF
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+    said = meter.ask("bytes LONG? 5000")
+    text = bytes(ord("a") + i % 26 for i in range(4999)) + b"\n"
+    assert said.startswith(f"ok 5000 {crc32c(text):08x} "), said
+    assert meter.ask("ask NONSENSE?").startswith("error")
+    assert meter.ask("ask *IDN?").startswith(f"ok {IDENTITY} ")
+
+
+def test_over_usb_a_lease_that_runs_out_means_off(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    for _ in range(10):
+        assert meter.ask("renew").startswith("ok")
+        time.sleep(0.1)
+    assert wavelength_nm(meter) == 1550
+    time.sleep(1.0)
+    refused = meter.ask("ask SENS:CORR:WAV?")
+    assert refused.startswith("error refused") and "0.5 s" in refused, refused
+    assert meter.ask("off").startswith("ok")
+    assert wavelength_nm(meter) == 1234
+
+
+def test_over_usb_a_death_means_off(usb):
+    usb.tell("plug 0 1 2")
+    meter = usb.guarded()
+    assert meter.ask("off").startswith("ok")
+    assert meter.ask("send SENS:CORR:WAV 1550").startswith("ok")
+    assert wavelength_nm(meter) == 1550
+    usb.clients.remove(meter)
+    meter.end(signal.SIGKILL)
+    wait_for(lambda: reads_1234(usb))

@@ -45,6 +45,7 @@ struct simbench_axis {
     int misses;   // the next moves end this number of times somewhere else
     bool frozen;  // never done
     bool swallow; // the next command is lost with its answer
+    bool disabled; // since it restarted: nothing moves before it was identified
     int moves, stops;
 };
 
@@ -57,6 +58,7 @@ struct simbench {
     struct link_stats bus; // as the axes' bus would keep it; the others have no link
     int range;
     double step_delay_s; // virtual time each call costs
+    const char *laser_is, *detector_is; // what they say they are; NULL: no serial number in it
 
     // faults: the fail_at-th call from now on fails; or one call of a device
     long calls, fail_at;
@@ -111,7 +113,10 @@ static inline int simbench_axis_identify(struct axis *a, struct gon_error *err)
 {
     struct simbench_axis *s = (struct simbench_axis *)a;
     bool done;
-    return simbench_call(s->bench, SIMBENCH_AXES, &done, err);
+    int rc = simbench_call(s->bench, SIMBENCH_AXES, &done, err);
+    if (done)
+        s->disabled = false;
+    return rc;
 }
 
 static inline int simbench_axis_status(struct axis *a, struct axis_status *ret,
@@ -150,7 +155,7 @@ static inline int simbench_axis_move(struct axis *a, int32_t position, int32_t s
         s->swallow = done = false;
         rc = gon_fail(err, GON_E_LINK, "no answer");
     }
-    if (!done || s->alarm)
+    if (!done || s->alarm || s->disabled)
         return rc;
     s->moves++;
     s->target_steps = position;
@@ -181,7 +186,7 @@ static inline int simbench_axis_home(struct axis *a, struct gon_error *err)
     struct simbench_axis *s = (struct simbench_axis *)a;
     bool done;
     int rc = simbench_call(s->bench, SIMBENCH_AXES, &done, err);
-    if (done) {
+    if (done && !s->disabled) {
         s->homing = true;
         motion_go(&s->bench->world.axis[s->which], 0.0, 10.0, 50.0, 50.0, s->bench->clk.t_ns);
     }
@@ -224,9 +229,10 @@ static inline int simbench_laser_identify(struct laser *l, char *text, size_t si
                                           struct gon_error *err)
 {
     bool done;
-    int rc = simbench_call(simbench_of_laser(l), SIMBENCH_LASER, &done, err);
+    struct simbench *b = simbench_of_laser(l);
+    int rc = simbench_call(b, SIMBENCH_LASER, &done, err);
     if (rc >= 0)
-        snprintf(text, size, "simulated laser");
+        snprintf(text, size, "%s", b->laser_is ? b->laser_is : "simulated laser");
     return rc;
 }
 
@@ -329,9 +335,10 @@ static inline int simbench_detector_identify(struct detector *d, char *text, siz
                                              struct gon_error *err)
 {
     bool done;
-    int rc = simbench_call(simbench_of_detector(d), SIMBENCH_DETECTOR, &done, err);
+    struct simbench *b = simbench_of_detector(d);
+    int rc = simbench_call(b, SIMBENCH_DETECTOR, &done, err);
     if (rc >= 0)
-        snprintf(text, size, "simulated lock-in");
+        snprintf(text, size, "%s", b->detector_is ? b->detector_is : "simulated lock-in");
     return rc;
 }
 

@@ -44,6 +44,7 @@ struct run {
     void (*on_pause)(struct run *r);
     int64_t cancel_at_ns;
     void (*on_time)(struct run *r);
+    bool strayed; // what on_time had to do once is done
 
     // what must never happen
     int violations;
@@ -115,7 +116,7 @@ static inline void keep(struct run *r, const struct store_reading *row)
     if (r->rows > 0 && is_accepted(&r->row[r->rows - 1]) && p->kind == PLAN_SAMPLE &&
         p == point_of(r, r->row[r->rows - 1].sweep, r->row[r->rows - 1].point))
         violate(r, "a point was measured again after it was accepted");
-    if (p->kind == PLAN_DARK && is_lit(r))
+    if (p->kind == PLAN_DARK && is_accepted(row) && is_lit(r))
         violate(r, "a dark with light");
     if (p->kind != PLAN_DARK && is_accepted(row) && r->state != RUN_PAUSED && !is_lit(r))
         violate(r, "light was expected");

@@ -5,6 +5,7 @@
 #include "base/crc32c.h"
 #include "base/err.h"
 #include "base/mail.h"
+#include "base/paths.h"
 #include "base/units.h"
 
 #include <pthread.h>
@@ -107,6 +108,26 @@ static void angles_survive_storage(void **state)
     assert_true(fabs(units_deg(units_rad(59.5)) - 59.5) < 1e-13);
 }
 
+static void the_guards_socket_stands_beside_the_daemons(void **state)
+{
+    (void)state;
+    static const char *const pairs[][2] = {{"/run/goniod.sock", "/run/goniod-guard.sock"},
+                                           {"/tmp/x", "/tmp/x-guard.sock"},
+                                           {".sock", ".sock-guard.sock"}};
+    char path[200], longest[120];
+    struct gon_error err;
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(paths_guard(pairs[i][0], path, sizeof path, &err), 0);
+        assert_string_equal(path, pairs[i][1]);
+    }
+    memset(longest, 'x', sizeof longest);
+    longest[107 - 11] = 0;
+    assert_int_equal(paths_guard(longest, path, sizeof path, &err), 0);
+    longest[107 - 11] = 'x';
+    longest[107 - 10] = 0;
+    assert_int_equal(paths_guard(longest, path, sizeof path, &err), GON_E_INPUT);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -117,6 +138,7 @@ int main(void)
         cmocka_unit_test(a_cancel_wakes_a_sleeper),
         cmocka_unit_test(mail_arrives_in_order_and_wakes_the_owner),
         cmocka_unit_test(angles_survive_storage),
+        cmocka_unit_test(the_guards_socket_stands_beside_the_daemons),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -183,6 +183,19 @@ static void wrong_types_are_named(void **state)
               "c.cfg:2: axes = { ... }: not a list of groups; write ( { ... }, { ... } )\n");
 }
 
+static void control_characters_are_shown_as_a_file_has_them(void **state)
+{
+    (void)state;
+    complains(
+        "campaign: { theta_i_deg = \"5\\r\\n\\t\\f\\x1b[2J\"; theta_r: { from_deg = -85; }; };",
+        "c.cfg:1: campaign.theta_i_deg = \"5\\r\\n\\t\\f\\x1b[2J\": not a number or a list of "
+        "numbers\n");
+    complains("campaign: { method = \"123456789012345678901234567890123456789\\r0\"; "
+              "theta_i_deg = 5; theta_r: { from_deg = -85; }; };",
+              "c.cfg:1: campaign.method = \"123456789012345678901234567890123456789\\r...\": "
+              "unknown; allowed \"memetic\", \"paper\"\n");
+}
+
 static void numbers_that_libconfig_bends_are_refused(void **state)
 {
     (void)state;
@@ -480,6 +493,7 @@ int main(void)
         cmocka_unit_test(every_kind_of_value_arrives),
         cmocka_unit_test(every_mistake_is_reported_with_its_line),
         cmocka_unit_test(wrong_types_are_named),
+        cmocka_unit_test(control_characters_are_shown_as_a_file_has_them),
         cmocka_unit_test(numbers_that_libconfig_bends_are_refused),
         cmocka_unit_test(lists_have_lengths),
         cmocka_unit_test(lists_of_words_are_checked_word_by_word),

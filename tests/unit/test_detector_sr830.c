@@ -281,6 +281,42 @@ static void what_was_cleared_is_not_told(void **state)
     d->ops->free(d);
 }
 
+// Reading clears what it tells: when the answer is lost nobody knows what there was.
+static void a_condition_whose_answer_was_lost_is_told_as_unsettled(void **state)
+{
+    (void)state;
+    struct detector *d = begin_ready(26);
+    condition(d);
+    for (int nth = 1; nth <= 2; nth++) { // overloads, and the sign of a restart
+        bench.world.lockin.condition = 1;
+        line.lose_nth = nth;
+        assert_int_equal(condition(d) & DETECTOR_UNSETTLED, DETECTOR_UNSETTLED);
+        assert_int_equal(condition(d), 0);
+    }
+    d->ops->free(d);
+}
+
+// The answer before it may have been another question's, and this one its own.
+static void an_answer_too_many_amid_a_reading_is_told_as_unsettled(void **state)
+{
+    (void)state;
+    struct detector_sample s;
+    struct detector *d = begin_ready(26);
+    condition(d);
+    assert_int_equal(d->ops->clear(d, NULL), 0);
+    assert_int_equal(d->ops->sample(d, &s, NULL), 0);
+    assert_int_equal(condition(d), 0);
+    assert_int_equal(d->ops->clear(d, NULL), 0);
+    assert_int_equal(d->ops->sample(d, &s, NULL), 0);
+    port_send(&line.port, "0.5,1000.00\r", 12, vline.clk.t_ns);
+    vline.clk.t_ns += MS(20);
+    assert_int_equal(d->ops->sample(d, &s, NULL), 0);
+    assert_int_equal(condition(d), DETECTOR_UNSETTLED);
+    assert_int_equal(d->ops->clear(d, NULL), 0);
+    assert_int_equal(condition(d), 0);
+    d->ops->free(d);
+}
+
 static void a_range_changed_at_the_front_panel_is_seen(void **state)
 {
     (void)state;
@@ -425,6 +461,8 @@ int main(void)
         cmocka_unit_test(conditions_are_told_once),
         cmocka_unit_test(what_was_cleared_is_not_told),
         cmocka_unit_test(a_range_changed_at_the_front_panel_is_seen),
+        cmocka_unit_test(a_condition_whose_answer_was_lost_is_told_as_unsettled),
+        cmocka_unit_test(an_answer_too_many_amid_a_reading_is_told_as_unsettled),
         cmocka_unit_test(a_restart_is_survived_and_told_until_set_up_again),
         cmocka_unit_test(a_sample_near_full_scale_counts_as_saturated),
         cmocka_unit_test(an_unplugged_instrument_comes_back),

@@ -245,9 +245,9 @@ static void all_that_is_unplugged_is_named_and_the_light_comes_first(void **stat
     r->on_row = unplug_laser_and_axes_at_row_13;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
-    assert_string_equal(r->pauses[0],
-                        "LASER MAY BE ON: use its key or the interlock; axis theta_i, axis theta_r, "
-                        "axis sample, laser: unplugged; waiting for them to come back");
+    assert_string_equal(
+        r->pauses[0], "LASER MAY BE ON: use its key or the interlock; axis theta_i, axis theta_r, "
+                      "axis sample, laser: unplugged; waiting for them to come back");
     end(r);
 }
 
@@ -718,6 +718,164 @@ static void another_bench_of_the_same_motors_measures_the_same(void **state)
     end(geared);
 }
 
+// True once: theta_r has stood for long enough that the filter settles or samples are taken.
+static bool amid_row_6(struct run *r)
+{
+    static int64_t still_ns;
+    const struct motion *m = &r->b.world.axis[WORLD_THETA_R];
+    if (r->rows != 6 || motion_at(m, r->b.clk.t_ns).moving)
+        still_ns = r->b.clk.t_ns;
+    if (r->strayed || r->b.clk.t_ns - still_ns < CLK_S(0.8))
+        return false;
+    return r->strayed = true;
+}
+
+static void stray_once(struct run *r)
+{
+    struct motion *m = &r->b.world.axis[WORLD_THETA_R];
+    if (amid_row_6(r))
+        motion_go(m, motion_at(m, r->b.clk.t_ns).motor + 1.0, 20, 60, 60, r->b.clk.t_ns);
+}
+
+static void what_was_read_while_an_axis_moved_is_no_reading(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_time = stray_once;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_true(r->strayed);
+    assert_complete(r);
+    assert_int_equal(r->row[6].flags & STORE_MOVED, STORE_MOVED);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "axis theta_r: moved by itself"));
+    double worst, rms;
+    compare(r, &worst, &rms);
+    assert_true(worst < 5.0);
+    end(r);
+}
+
+static void restart_once(struct run *r)
+{
+    if (amid_row_6(r))
+        r->b.axis[WORLD_THETA_R].homed = false;
+}
+
+// Where it stood while it was read nobody knows.
+static void what_was_read_while_a_controller_restarted_is_no_reading(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_time = restart_once;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->row[6].flags & STORE_DISCARDED, STORE_DISCARDED);
+    end(r);
+}
+
+static void off_is_ignored_and_the_store_fails_at_row_7(struct run *r)
+{
+    if (r->rows != 7)
+        return;
+    r->b.world.laser.ignores_off = true;
+    r->store_fail_at = 8;
+    r->store_fails = 30; // half a minute
+}
+
+static void obey_off_after_ten_seconds(struct run *r)
+{
+    static int64_t since_ns;
+    if (r->state != RUN_PAUSED)
+        since_ns = r->b.clk.t_ns;
+    else if (r->b.clk.t_ns - since_ns > CLK_S(10))
+        r->b.world.laser.ignores_off = false;
+}
+
+static void an_off_is_repeated_also_while_the_store_is_waited_for(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_row = off_is_ignored_and_the_store_fails_at_row_7;
+    r->on_time = obey_off_after_ten_seconds;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    end(r); // never on at rest once it obeys
+}
+
+static int64_t alarmed_ns, noticed_ns;
+
+static void raise_alarm_while_warming(struct run *r)
+{
+    if (!r->strayed && r->b.ons == 1 && emits(r)) {
+        r->strayed = true;
+        r->b.axis[WORLD_SAMPLE].alarm = 0x30;
+        alarmed_ns = r->b.clk.t_ns;
+    }
+}
+
+static void note_time_and_clear(struct run *r)
+{
+    noticed_ns = r->b.clk.t_ns;
+    r->b.axis[WORLD_SAMPLE].alarm = 0;
+}
+
+static void an_alarm_while_the_laser_warms_up_pauses(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->bench.laser.warmup_s = 60;
+    r->on_time = raise_alarm_while_warming;
+    r->on_pause = note_time_and_clear;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "axis sample: alarm 30h"));
+    assert_int_equal(r->b.ons, 2);
+    assert_true(noticed_ns - alarmed_ns < CLK_S(2));
+    end(r);
+}
+
+static void somebody_turns_a_knob(struct run *r)
+{
+    r->b.world.lockin.time_constant_s = 1.0;
+}
+
+// Also one that restarted then and whose sign of it was read by nobody.
+static void the_detector_is_set_up_again_after_a_pause(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_row = pause_at_seventh_row;
+    r->on_pause = somebody_turns_a_knob;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 1);
+    assert_true(r->b.world.lockin.time_constant_s == r->bench.detector.time_constant_s);
+    end(r);
+}
+
+static void light_by_itself_in_the_dark(struct run *r)
+{
+    if (r->strayed || r->b.range != 26) // the first range of a reading
+        return;
+    r->strayed = true;
+    world_see(&r->b.world, r->b.clk.t_ns);
+    sim_laser_start(&r->b.world.laser, true);
+}
+
+static void a_dark_with_light_that_came_by_itself_is_none(void **state)
+{
+    (void)state;
+    struct run *r = begin(NULL);
+    r->on_time = light_by_itself_in_the_dark;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_true(r->strayed);
+    assert_complete(r);
+    assert_int_equal(r->row[0].flags & STORE_DISCARDED, STORE_DISCARDED);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "laser: emits although it was switched off"));
+    end(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -745,6 +903,12 @@ int main(void)
         cmocka_unit_test(nonsense_is_asked_again_and_in_the_end_somebody_is),
         cmocka_unit_test(a_restarted_controller_is_homed_again_in_the_dark),
         cmocka_unit_test(an_off_that_is_not_confirmed_is_repeated_until_it_is),
+        cmocka_unit_test(a_dark_with_light_that_came_by_itself_is_none),
+        cmocka_unit_test(the_detector_is_set_up_again_after_a_pause),
+        cmocka_unit_test(an_off_is_repeated_also_while_the_store_is_waited_for),
+        cmocka_unit_test(an_alarm_while_the_laser_warms_up_pauses),
+        cmocka_unit_test(what_was_read_while_an_axis_moved_is_no_reading),
+        cmocka_unit_test(what_was_read_while_a_controller_restarted_is_no_reading),
         cmocka_unit_test(another_bench_of_the_same_motors_measures_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -3,6 +3,7 @@
 #include "cli/explain.h"
 
 #include "cli/ports.h"
+#include "drivers/transport_adapter.h"
 #include "drivers/laser.h"
 
 #include <setjmp.h>
@@ -210,25 +211,30 @@ static void ports_are_listed_by_their_lasting_names(void **state)
     char folder[] = "/tmp/gonio-ports-XXXXXX", path[80], text[200];
     (void)state;
     assert_non_null(mkdtemp(folder));
-    ports_text(folder, text, sizeof text);
+    ports_text(folder, NULL, 0, text, sizeof text);
     assert_non_null(strstr(text, "no USB serial adapter is plugged in"));
     static const char *const names[] = {"usb-B", "usb-A"};
     for (int i = 0; i < 2; i++) {
         snprintf(path, sizeof path, "%s/%s", folder, names[i]);
         fclose(fopen(path, "w"));
     }
-    ports_text(folder, text, sizeof text);
+    ports_text(folder, NULL, 0, text, sizeof text);
     char expected[200];
     snprintf(expected, sizeof expected, "ports that exist: %s/usb-A, %s/usb-B", folder, folder);
     assert_string_equal(text, expected);
-    ports_text(folder, text, 60); // as many as fit
+    ports_text(folder, NULL, 0, text, 60); // as many as fit
     assert_string_equal(text + strlen(text) - 5, "usb-A");
     for (int i = 0; i < 2; i++) {
         snprintf(path, sizeof path, "%s/%s", folder, names[i]);
         unlink(path);
     }
+    static const struct adapter adapters[] = {{"/dev/ttyUSB0", 0x0403, 0x6001, "A1"},
+                                              {"/dev/ttyACM0", 0x2341, 0x0043, ""}};
+    ports_text(folder, adapters, 2, text, sizeof text);
+    assert_string_equal(text, "ports that exist: usb-0403:6001:A1 (/dev/ttyUSB0), usb-2341:0043 "
+                              "(/dev/ttyACM0)");
     rmdir(folder);
-    ports_text(folder, text, sizeof text);
+    ports_text(folder, NULL, 0, text, sizeof text);
     assert_non_null(strstr(text, "no USB serial adapter"));
 }
 

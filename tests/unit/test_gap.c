@@ -148,6 +148,28 @@ static void nothing_is_measured_again_without_need(void **state)
     end(r);
 }
 
+// What the store gives a campaign that goes on.
+static struct engine_opening opening_of(const struct run *r)
+{
+    const struct reduce_reference o = reduce_opening(&r->plan, r->row, r->rows);
+    struct engine_opening opening = {.last_utc_ms = r->row[r->rows - 1].t_utc_ms,
+                                     .dark_signal_v = o.dark_signal_v,
+                                     .dark_monitor_v = o.dark_monitor_v};
+    memcpy(opening.beam_signal_v, o.beam_signal_v, sizeof o.beam_signal_v);
+    memcpy(opening.beam_monitor_v, o.beam_monitor_v, sizeof o.beam_monitor_v);
+    return opening;
+}
+
+static void take_progress(struct run *r)
+{
+    for (int i = 0; i < r->plan.count; i++)
+        for (int k = 0; k < r->rows; k++)
+            if (r->row[k].sweep == r->points[i].sweep && r->row[k].point == r->points[i].point) {
+                r->points[i].done |= is_accepted(&r->row[k]);
+                r->points[i].attempts = r->row[k].attempt;
+            }
+}
+
 static void stop_then(struct run *r)
 {
     if (r->rows == pause_row)
@@ -161,18 +183,8 @@ static void a_campaign_that_goes_on_another_day_has_them_again(void **state)
     r->on_row = stop_then;
     assert_int_equal(go(r), RUN_STOPPED);
     const int before = r->rows;
-    for (int i = 0; i < r->plan.count; i++)
-        for (int k = 0; k < r->rows; k++)
-            if (r->row[k].sweep == r->points[i].sweep && r->row[k].point == r->points[i].point) {
-                r->points[i].done |= is_accepted(&r->row[k]);
-                r->points[i].attempts = r->row[k].attempt;
-            }
-    const struct reduce_reference o = reduce_opening(&r->plan, r->row, r->rows);
-    struct engine_opening opening = {.last_utc_ms = r->row[before - 1].t_utc_ms,
-                                     .dark_signal_v = o.dark_signal_v,
-                                     .dark_monitor_v = o.dark_monitor_v};
-    memcpy(opening.beam_signal_v, o.beam_signal_v, sizeof o.beam_signal_v);
-    memcpy(opening.beam_monitor_v, o.beam_monitor_v, sizeof o.beam_monitor_v);
+    take_progress(r);
+    const struct engine_opening opening = opening_of(r);
     r->ports.opening = &opening;
     r->on_row = NULL;
     cancel_reset(r->cancel);
@@ -183,6 +195,28 @@ static void a_campaign_that_goes_on_another_day_has_them_again(void **state)
     assert_int_equal(r->row[before].sweep, 0);
     assert_int_equal(said_count, 1);
     assert_non_null(strstr(said[0], "after a gap of 864"));
+    end(r);
+}
+
+// Sweep 1 is measured again another day: its references are open, too, and measured once, not once
+// more as after a gap.
+static void references_that_are_open_anyway_are_measured_once(void **state)
+{
+    (void)state;
+    struct run *r = begin_paused(0);
+    assert_int_equal(go(r), RUN_DONE);
+    take_progress(r);
+    const int before = r->rows;
+    for (int i = 0; i < r->plan.count; i++)
+        r->points[i].done = r->points[i].kind == PLAN_SAMPLE && r->points[i].sweep != 1;
+    const struct engine_opening opening = opening_of(r);
+    r->ports.opening = &opening;
+    r->b.clk.t_ns += CLK_S(86400);
+    assert_int_equal(go(r), RUN_DONE);
+    assert_int_equal(rows_of(r, PLAN_DARK, 0), 2);
+    assert_int_equal(rows_of(r, PLAN_BEAM, 0), 2);
+    assert_int_equal(r->row[before].sweep, 0);
+    assert_int_equal(r->violations, 0);
     end(r);
 }
 
@@ -235,6 +269,7 @@ int main(void)
         cmocka_unit_test(dark_and_beam_are_measured_again_before_the_sample),
         cmocka_unit_test(nothing_is_measured_again_without_need),
         cmocka_unit_test(a_campaign_that_goes_on_another_day_has_them_again),
+        cmocka_unit_test(references_that_are_open_anyway_are_measured_once),
         cmocka_unit_test(readings_are_reduced_with_the_references_around_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

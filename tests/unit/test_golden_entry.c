@@ -143,11 +143,12 @@ struct made {
     struct gon_error err;
 };
 
-static struct made make(const char *about, enum golden_wire wire, const char *sent,
-                        const char *received, const char *does, const char *with)
+static struct made make_over(bool is_usb, const char *about, enum golden_wire wire,
+                             const char *sent, const char *received, const char *does,
+                             const char *with)
 {
     struct profile *p = parsed(about);
-    const struct golden_maker m = {p, wire, 7, "recorded by this test"};
+    const struct golden_maker m = {p, wire, 7, "recorded by this test", is_usb};
     const struct captured c = {bytes(sent, wire != GOLDEN_MESSAGE),
                                bytes(received, wire != GOLDEN_MESSAGE)};
     struct profile_data d;
@@ -166,6 +167,24 @@ static struct made make(const char *about, enum golden_wire wire, const char *se
     return made;
 }
 
+static struct made make(const char *about, enum golden_wire wire, const char *sent,
+                        const char *received, const char *does, const char *with)
+{
+    return make_over(false, about, wire, sent, received, does, with);
+}
+
+static void only_usb_ends_an_answer_without_its_terminator(void **state)
+{
+    (void)state;
+    const struct made usb = make_over(true, plain, GOLDEN_MESSAGE, "x?\r", "1.5 V", "x", "");
+    assert_int_equal(usb.rc, 0);
+    assert_string_equal(usb.g.received, "1.5 V");
+    assert_string_equal(usb.g.gives, "x = 1.5");
+    const struct made cut = make(plain, GOLDEN_MESSAGE, "x?\r", "1.5 V", "x", "");
+    assert_int_equal(cut.rc, GON_E_LINK);
+    assert_non_null(strstr(cut.err.text, "broken off"));
+}
+
 static void exchanges_become_entries(void **state)
 {
     static const struct {
@@ -174,7 +193,6 @@ static void exchanges_become_entries(void **state)
     } rows[] = {
         {plain, "x?\r", "1.5 V\r\n", "x", "", "x", "x?", "1.5 V", "x = 1.5", ""},
         {plain, "x?\r", " 1.5 V \r\n", "go", "", "x", "x?", " 1.5 V ", "x = 1.5", ""},
-        {plain, "x?\r", "1.5 V", "x", "", "x", "x?", "1.5 V", "x = 1.5", ""}, // ended by USB
         {plain, "x 2.00\r", "OK\r\n", "set", "x = 2", "set", "x 2.00", "OK", "", "x = 2"},
         {plain, "x 2.00\r", "Error 3\r\n", "set", "x = 2", "set", "x 2.00", "Error 3", "", "x = 2"},
         {plain, "x?\r", "ERROR \"?\"\r\n", "x", "", "x", "x?", "ERROR \"?\"", "", ""},
@@ -310,6 +328,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_entry_is_read_back_as_it_was),
         cmocka_unit_test(values_are_read_back_as_they_were),
+        cmocka_unit_test(only_usb_ends_an_answer_without_its_terminator),
         cmocka_unit_test(exchanges_become_entries),
         cmocka_unit_test(what_is_no_exchange_becomes_none),
         cmocka_unit_test(frames_become_entries),

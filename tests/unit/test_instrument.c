@@ -153,6 +153,94 @@ static void an_off_that_was_not_confirmed_is_repeated_when_idle(void **state)
     end(s);
 }
 
+// Unplugged for a second.
+static void replug(struct setting *s, enum simbench_device device)
+{
+    s->b.gone_until_ns[device] = s->b.clk.t_ns + CLK_S(1);
+    instrument_tend(s->in);
+    clk_sleep(&s->b.clk.clk, CLK_S(6), NULL);
+}
+
+static void another_detector_is_not_used(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    struct detector_sample sample;
+    struct gon_error err;
+    s->b.detector_is = "maker,lock-in,A1,1.0";
+    make(s);
+    replug(s, SIMBENCH_DETECTOR);
+    s->b.detector_is = "maker,lock-in,B2,1.0";
+    const int setups = s->b.setups;
+    assert_int_equal(instrument_connect(s->in, PART_DETECTOR, &err), GON_E_DEVICE);
+    assert_string_equal(err.text, "detector: another device answers here: serial number A1 before, "
+                                  "B2 now; plug the former one in again, or restart goniod when "
+                                  "the exchange is meant");
+    assert_int_equal(s->b.setups, setups);
+    assert_int_equal(instrument_sample(s->in, &sample, &err), GON_E_GONE);
+    assert_non_null(strstr(err.text, "serial number A1 before"));
+    assert_int_equal(instrument_set_up(s->in, NULL), GON_E_GONE);
+    assert_int_equal(instrument_tend(s->in), 1);
+    instrument_snapshot(s->in, &s->now);
+    assert_string_equal(s->now.part[PART_DETECTOR].identity, "maker,lock-in,A1,1.0");
+    assert_true(s->now.part[PART_DETECTOR].refused);
+
+    s->b.detector_is = "maker,lock-in,A1,1.1";
+    clk_sleep(&s->b.clk.clk, CLK_S(6), NULL);
+    assert_int_equal(instrument_tend(s->in), 0);
+    assert_int_equal(instrument_sample(s->in, &sample, &err), 0);
+    instrument_snapshot(s->in, &s->now);
+    assert_string_equal(s->now.part[PART_DETECTOR].identity, "maker,lock-in,A1,1.1");
+    assert_false(s->now.part[PART_DETECTOR].refused);
+    end(s);
+}
+
+static void what_another_laser_says_of_off_is_not_believed(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    struct gon_error err;
+    s->b.laser_is = "a laser, serial 7, firmware 1";
+    make(s);
+    instrument_permit(s->in, true);
+    assert_int_equal(instrument_emission_on(s->in, NULL), 0);
+    s->b.gone_until_ns[SIMBENCH_LASER] = s->b.clk.t_ns + CLK_S(1);
+    assert_int_equal(instrument_emission_off(s->in, NULL), GON_E_GONE);
+    clk_sleep(&s->b.clk.clk, CLK_S(1), NULL);
+    s->b.laser_is = "a laser, serial 8, firmware 1";
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(instrument_connect(s->in, PART_LASER, &err), GON_E_DEVICE);
+        assert_non_null(strstr(err.text, "serial number 7 before, 8 now"));
+        assert_int_equal(instrument_light_left(s->in), SAFETY_LIGHT_MAYBE);
+        instrument_snapshot(s->in, &s->now);
+        assert_true(s->now.emission && s->now.off_unconfirmed);
+        assert_int_equal(instrument_emission_on(s->in, NULL), GON_E_GONE);
+    }
+    s->b.laser_is = "a laser, serial 7, firmware 1";
+    assert_int_equal(instrument_connect(s->in, PART_LASER, NULL), 0);
+    assert_int_equal(instrument_light_left(s->in), SAFETY_LIGHT_OFF);
+    instrument_snapshot(s->in, &s->now);
+    assert_false(s->now.emission || s->now.off_unconfirmed);
+    end(s);
+}
+
+static void an_off_that_another_laser_confirmed_is_none_at_the_end(void **state)
+{
+    (void)state;
+    struct setting *s = begin();
+    s->b.laser_is = "a laser, serial 7";
+    make(s);
+    instrument_permit(s->in, true);
+    assert_int_equal(instrument_emission_on(s->in, NULL), 0);
+    s->b.gone_until_ns[SIMBENCH_LASER] = s->b.clk.t_ns + CLK_S(1);
+    assert_int_equal(instrument_emission_off(s->in, NULL), GON_E_GONE);
+    clk_sleep(&s->b.clk.clk, CLK_S(1), NULL);
+    s->b.laser_is = "a laser, serial 8";
+    assert_int_equal(instrument_connect(s->in, PART_LASER, NULL), GON_E_DEVICE);
+    assert_false(instrument_free(s->in));
+    free(s);
+}
+
 static void a_snapshot_tells_what_the_links_have_seen(void **state)
 {
     (void)state;
@@ -313,7 +401,7 @@ static void ports_that_are_not_there_do_not_stop_the_daemon(void **state)
     snprintf(s->bench.detector.link, sizeof s->bench.detector.link,
              "serial:/nowhere/detector?baud=9600");
     struct gon_error err;
-    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), 0);
+    assert_int_equal(instrument_open(&s->bench, NULL, &s->b.clk.clk, &s->in, &err), 0);
     instrument_snapshot(s->in, &s->now);
     for (int i = 0; i < PART_COUNT; i++) {
         if (expected(i, PART_OK) == PART_ABSENT)
@@ -337,7 +425,7 @@ static void a_link_that_is_no_link_is_an_error_of_the_bench(void **state)
     s->bench.axes_count = 0;
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "carrier-pigeon:laser");
     snprintf(s->bench.detector.link, sizeof s->bench.detector.link, "serial:/nowhere/detector");
-    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
+    assert_int_equal(instrument_open(&s->bench, NULL, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "laser: "));
     assert_null(s->in);
     free(s);
@@ -352,7 +440,7 @@ static void a_profile_that_is_not_there_is_an_error_of_the_bench(void **state)
     s->bench.axes_count = 0;
     snprintf(s->bench.laser.driver, sizeof s->bench.laser.driver, "cobolt-99");
     snprintf(s->bench.laser.link, sizeof s->bench.laser.link, "serial:/nowhere/laser");
-    assert_int_equal(instrument_open(&s->bench, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
+    assert_int_equal(instrument_open(&s->bench, NULL, &s->b.clk.clk, &s->in, &err), GON_E_INPUT);
     assert_non_null(strstr(err.text, "no profile 'cobolt-99': looked for "));
     free(s);
 }
@@ -365,6 +453,9 @@ int main(void)
         cmocka_unit_test(tries_to_reconnect_are_paced),
         cmocka_unit_test(a_laser_that_lights_by_itself_is_switched_off),
         cmocka_unit_test(an_off_that_was_not_confirmed_is_repeated_when_idle),
+        cmocka_unit_test(another_detector_is_not_used),
+        cmocka_unit_test(what_another_laser_says_of_off_is_not_believed),
+        cmocka_unit_test(an_off_that_another_laser_confirmed_is_none_at_the_end),
         cmocka_unit_test(a_snapshot_tells_what_the_links_have_seen),
         cmocka_unit_test(waiting_renews_the_lease_every_100_ms),
         cmocka_unit_test(user_units_have_zero_and_direction),

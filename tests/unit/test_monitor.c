@@ -194,6 +194,19 @@ static void one_beyond_every_range_pauses_the_run(void **state)
     end(r);
 }
 
+static void one_that_sees_no_light_is_named_before_anything_is_measured(void **state)
+{
+    (void)state;
+    struct run *r = begin_monitored(0);
+    r->devices.monitor.times = 0;
+    r->on_pause = stop_there;
+    assert_int_equal(go(r), RUN_STOPPED);
+    assert_int_equal(r->pauses_count, 1);
+    assert_non_null(strstr(r->pauses[0], "the monitor reads 0 V as in the dark"));
+    assert_int_equal(accepted_of(r, &r->points[2]), 0);
+    end(r);
+}
+
 static void what_is_no_number_is_asked_again_and_never_stored(void **state)
 {
     (void)state;
@@ -241,6 +254,7 @@ int main(void)
         cmocka_unit_test(a_saturated_monitor_discards_the_attempt_and_goes_one_range_up),
         cmocka_unit_test(one_that_lost_its_settings_is_set_up_again),
         cmocka_unit_test(one_beyond_every_range_pauses_the_run),
+        cmocka_unit_test(one_that_sees_no_light_is_named_before_anything_is_measured),
         cmocka_unit_test(what_is_no_number_is_asked_again_and_never_stored),
         cmocka_unit_test(an_unplugged_one_pauses_the_run_until_it_is_back),
     };

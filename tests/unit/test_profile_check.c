@@ -245,7 +245,9 @@ static void mistakes_in_values_are_named(void **state)
         {"unit = \"W\"; max = 2", "unit = \"W\"; scale = 0; max = 2",
          "t:6: values[2].scale = 0: makes every number the same"},
         {"unit = \"W\"; max = 2", "unit = \"W\"; min = 3; max = 2",
-         "t:6: values[2].min = 3: is above max"},
+         "t:6: values[2].min = 3: is above max = 2"},
+        {"unit = \"W\"; max = 2", "unit = \"W\"; min = 3",
+         "t:6: values[2].min = 3: is above max = 0, which is 0 where it is not given"},
         {"; words = ( \"OFF\", \"ON\" )", "",
          "t:8: values[4].type = \"word\": a word needs its list of words"},
         {"\"OFF\", \"ON\"", "\"OFF\", \"off\"",
@@ -285,6 +287,10 @@ static void mistakes_in_framing_are_named(void **state)
 {
     static const struct mistake mistakes[] = {
         {"end_out = \"\\r\"; ", "", "t:12: framing.end_out: missing; it says what ends a command"},
+        {"gap_ms = 50;", "gap_ms = 50; echo_end = \"\\r\\n\";",
+         "t:12: framing.echo_end = \"\\r\\n\": has end_in in it, so that the repeated command "
+         "would be taken for the answer; of an instrument that repeats it as a line of its own switch "
+         "the echo off"},
         {"end_in = \"\\r\\n\"; ", "", "t:12: framing.end_in: missing; it says what ends an answer"},
         {"timeout_ms = 200", "timeout_ms = 400",
          "t:13: framing.quiet_ms = 350: below timeout_ms: an answer that is waited for may come "
@@ -483,6 +489,10 @@ static void mistakes_in_what_is_simulated_and_golden_are_named(void **state)
     static const struct mistake mistakes[] = {
         {"value = \"emission\"; is", "value = \"emision\"; is",
          "t:48: simulate.start[0].value = \"emision\": there is no such value"},
+        {"{ value = \"emission\"; is", "{ value = \"\"; is",
+         "t:48: simulate.start[0].value = \"\": missing; it says which value"},
+        {"{ value = \"setpoint_w\"; when", "{ value = \"\"; when",
+         "t:49: simulate.drift[0].value = \"\": missing; it says which value"},
         {"is = \"0\"", "is = \"no\"", "t:48: simulate.start[0].is = \"no\": 'no' is not a number"},
         {"value = \"setpoint_w\"; when", "value = \"setpoint\"; when",
          "t:49: simulate.drift[0].value = \"setpoint\": there is no such value"},

@@ -228,6 +228,7 @@ static void what_cannot_be_written_is_refused(void **state)
     }
 }
 
+#define NO_FORMAT "not a format (0, width, .digits, one of d x X f e g s; no + or -)"
 static void patterns_that_are_wrong_say_why(void **state)
 {
     static const struct {
@@ -241,13 +242,14 @@ static void patterns_that_are_wrong_say_why(void **state)
         {"[a", true, "']' is missing"},
         {"a]", true, "'[' is missing before ']'"},
         {"[a[b]]", true, "a [ ] inside another"},
-        {"{x:}", true, "not a format at '{x:}'"},
-        {"{x:5}", true, "not a format at '{x:5}'"},
-        {"{x:%f}", true, "not a format at '{x:%f}'"},
-        {"{x:*d}", true, "not a format at '{x:*d}'"},
-        {"{x:n}", true, "not a format at '{x:n}'"},
-        {"{x:.1.1f}", true, "not a format at '{x:.1.1f}'"},
-        {"{x:12345.6f}", true, "not a format at '{x:12345.6f}'"},
+        {"{x:}", true, NO_FORMAT " at '{x:}'"},
+        {"{x:5}", true, NO_FORMAT " at '{x:5}'"},
+        {"{x:%f}", true, NO_FORMAT " at '{x:%f}'"},
+        {"{x:*d}", true, NO_FORMAT " at '{x:*d}'"},
+        {"{x:n}", true, NO_FORMAT " at '{x:n}'"},
+        {"{x:.1.1f}", true, NO_FORMAT " at '{x:.1.1f}'"},
+        {"{x:+.3f}", true, NO_FORMAT " at '{x:+.3f}'"},
+        {"{x:12345.6f}", true, NO_FORMAT " at '{x:12345.6f}'"},
         {"{model:d}", true, "{model:d}: a text is written by s"},
         {"{x:s}", true, "{x:s}: a number is not written by s"},
         {"{x:d}", true, "{x:d}: it is real, and written by f, e or g"},

@@ -134,6 +134,56 @@ static void a_run_is_done_after_its_last_fit_is_stored(void **state)
     queue_free(q);
 }
 
+// A sweep of it was to be measured again after the engine had its plan.
+static void a_run_that_is_open_again_comes_first(void **state)
+{
+    (void)state;
+    struct queue *q = make(3);
+    measure(q, 2);
+    assert_int_equal(queue_submit(q, 3, NULL), 0);
+    queue_ended(q, 2, RUN_DONE, NULL);
+    EXPECT("3=queued; close 2 1; ");
+    queue_reopened(q, 2);
+    EXPECT("2=queued; open 2; ");
+    assert_string_equal(kept, "*2 3 ");
+    queue_opened(q, 2, (void *)"rest", NULL);
+    queue_ended(q, 2, RUN_DONE, NULL);
+    queue_closed(q, 2, NULL);
+    EXPECT("start 2 rest; close 2 1; 2=done; open 3; ");
+    queue_free(q);
+}
+
+static void a_run_that_is_open_again_waits_in_a_held_queue(void **state)
+{
+    (void)state;
+    struct queue *q = make(3);
+    measure(q, 2);
+    assert_int_equal(queue_hold(q, 0, true, NULL), 0);
+    queue_ended(q, 2, RUN_DONE, NULL);
+    *said = 0;
+    queue_reopened(q, 2);
+    EXPECT("2=queued; ");
+    assert_true(queue_idle(q));
+    queue_free(q);
+}
+
+static void a_stop_is_stronger_than_what_is_to_be_measured_again(void **state)
+{
+    (void)state;
+    struct queue *q = make(3);
+    measure(q, 2);
+    queue_fit_asked(q, 2, 1, true);
+    queue_ended(q, 2, RUN_DONE, NULL);
+    assert_true(queue_stop(q, "by hand"));
+    queue_fitted(q, 2, "{}", NULL);
+    *said = 0;
+    queue_reopened(q, 2);
+    assert_non_null(strstr(said, "2=stopped"));
+    assert_null(strstr(said, "open 2"));
+    assert_true(queue_idle(q));
+    queue_free(q);
+}
+
 static void runs_wait_for_each_other(void **state)
 {
     (void)state;
@@ -366,6 +416,9 @@ int main(void)
         cmocka_unit_test(the_queue_of_an_earlier_life_waits),
         cmocka_unit_test(the_end_of_the_daemon_leaves_the_queue_as_it_was),
         cmocka_unit_test(a_run_is_done_after_its_last_fit_is_stored),
+        cmocka_unit_test(a_run_that_is_open_again_comes_first),
+        cmocka_unit_test(a_run_that_is_open_again_waits_in_a_held_queue),
+        cmocka_unit_test(a_stop_is_stronger_than_what_is_to_be_measured_again),
         cmocka_unit_test(runs_wait_for_each_other),
         cmocka_unit_test(what_cannot_be_queued_is_refused),
         cmocka_unit_test(a_stop_empties_the_queue_and_waits_for_the_workers),

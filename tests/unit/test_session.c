@@ -414,6 +414,26 @@ static void it_gets_into_step_with_the_very_same_unit(void **state)
     session_free(z);
 }
 
+// Who it is then is for the caller to judge: it has to be heard first.
+static void after_a_reopening_any_unit_may_answer(void **state)
+{
+    struct scripted s;
+    struct gon_error err;
+    char title[80];
+    (void)state;
+    struct session *z = begin(&s);
+    assert_int_equal(session_identify(z, title, sizeof title, &err), 0);
+    answer(0, "id?", "counter,008");
+    answer(1, "x?", "1");
+    assert_int_equal(session_reopen(z, &err), 0);
+    s.heard = 0;
+    assert_int_equal(session_ask_one(z, "x", &err), 0);
+    assert_int_equal(s.heard, 1); // nothing else was asked before
+    assert_int_equal(session_identify(z, title, sizeof title, &err), 0);
+    assert_string_equal(title, "counter, serial 008");
+    session_free(z);
+}
+
 static void an_unknown_name_is_an_error_and_nothing_is_sent(void **state)
 {
     struct scripted s;
@@ -541,6 +561,7 @@ int main(void)
         cmocka_unit_test(an_error_queue_is_asked_and_emptied),
         cmocka_unit_test(a_restart_is_told_once),
         cmocka_unit_test(it_gets_into_step_with_the_very_same_unit),
+        cmocka_unit_test(after_a_reopening_any_unit_may_answer),
         cmocka_unit_test(an_unknown_name_is_an_error_and_nothing_is_sent),
         cmocka_unit_test(a_bus_instrument_is_no_text_instrument),
         cmocka_unit_test(checksums_leave_no_wrong_value),

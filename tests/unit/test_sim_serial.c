@@ -98,6 +98,12 @@ static void a_command_that_comes_too_early_is_ignored(void **state)
     r->t_ns += MS(1);
     assert_string_equal(say(r, BENCH_LASER, "p?\r"), "0.0200\r\n");
     assert_int_equal(r->bench.laser.too_early, 2);
+    int too_early = 0; // all that came over the wire is remembered with its time
+    for (uint64_t i = 0; i < r->bench.laser.heard_count; i++) {
+        too_early += r->bench.laser.heard[i].too_early;
+        assert_true(i == 0 || r->bench.laser.heard[i].t_ns >= r->bench.laser.heard[i - 1].t_ns);
+    }
+    assert_int_equal(too_early, 2);
     r->t_ns += MS(100);
     assert_string_equal(say(r, BENCH_LASER, "?\r?\r"), "OK\r\n"); // the second came at once
     free(r);

@@ -445,9 +445,9 @@ static void other_files_and_newer_ones_are_refused(void **state)
     assert_int_equal(store_open(folder.path, STORE_READ, &s, &err), GON_E_INPUT);
     unlink(path);
     store_close(created(), NULL);
-    tamper("PRAGMA user_version = 4");
+    tamper("PRAGMA user_version = 5");
     assert_int_equal(store_open(path, STORE_READ, &s, &err), GON_E_REFUSED);
-    assert_non_null(strstr(err.text, "version 4 of the file, of a newer gonio"));
+    assert_non_null(strstr(err.text, "version 5 of the file, of a newer gonio"));
     assert_non_null(strstr(err.text, "install the newer one"));
     assert_int_equal(store_open(path, STORE_WRITE, &s, NULL), GON_E_REFUSED);
     assert_int_equal(fixture_files(&folder), 1);
@@ -626,24 +626,25 @@ static void an_older_file_is_copied_before_it_changes(void **state)
 {
     (void)state;
     static const char *const older[] = {"tests/golden/campaign_v1.sql",
-                                        "tests/golden/campaign_v2.sql"};
-    static const int readings[] = {7, 13};
-    for (int version = 1; version <= 2; version++) {
+                                        "tests/golden/campaign_v2.sql",
+                                        "tests/golden/campaign_v3.sql"};
+    static const int readings[] = {7, 13, 9};
+    for (int version = 1; version <= 3; version++) {
         char backup[200], second[200];
         make_from_sql(older[version - 1]);
         struct store *s = opened(STORE_WRITE);
         snprintf(backup, sizeof backup, "%s.v%d-backup", path, version);
         assert_non_null(strstr(store_notice(s), backup));
-        const struct store_reading last = reading(3, version, 1);
+        const struct store_reading last = reading(3, version == 2 ? 2 : 1, 1);
         append(s, &last);
         store_close(s, NULL);
-        assert_int_equal(number("PRAGMA user_version"), 3);
+        assert_int_equal(number("PRAGMA user_version"), 4);
         assert_int_equal(number("SELECT count(*) FROM reading"), readings[version - 1] + 1);
         assert_int_equal(number_of(backup, "PRAGMA user_version"), version);
         assert_int_equal(number_of(backup, "PRAGMA application_id"), 1735356009);
         assert_int_equal(number_of(backup, "SELECT count(*) FROM reading"), readings[version - 1]);
         assert_int_equal(number_of(backup, "SELECT count(*) FROM sqlite_schema WHERE name LIKE"
-                                           " 'profile%'"),
+                                           " 'exclusion%'"),
                          0);
         assert_int_equal(fixture_files(&folder), 2);
         s = opened(STORE_WRITE); // a second time there is nothing to do
@@ -675,7 +676,7 @@ static void a_step_that_fails_changes_nothing(void **state)
     tamper("DROP TABLE profile");
     s = opened(STORE_WRITE);
     store_close(s, NULL);
-    assert_int_equal(number("PRAGMA user_version"), 3);
+    assert_int_equal(number("PRAGMA user_version"), 4);
 }
 
 static void without_a_copy_nothing_is_changed(void **state)
@@ -716,6 +717,74 @@ static void a_moved_file_is_noticed_at_the_next_reading(void **state)
     assert_int_equal(store_read_readings(s, -1, &rows, NULL), 2);
     free(rows);
     store_close(s, NULL);
+}
+
+// What nobody but us can still see.
+static void a_removed_file_is_written_again(void **state)
+{
+    (void)state;
+    struct store_reading next = reading(1, 3, 1), *rows;
+    struct gon_error err;
+    store_close(created(), NULL);
+    // Pages in another order than in a copy, so that the old WAL would do harm to it.
+    tamper("CREATE TABLE m AS SELECT * FROM meta; DROP TABLE meta; CREATE TABLE meta"
+           " (key TEXT PRIMARY KEY, value) WITHOUT ROWID; INSERT INTO meta SELECT * FROM m;"
+           " DROP TABLE m");
+    struct store *s = opened(STORE_WRITE), *reader = opened(STORE_READ);
+    for (int point = 0; point < 3; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+    }
+    assert_int_equal(store_read_readings(reader, -1, &rows, NULL), 3); // so its WAL stays
+    free(rows);
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE); // the run must pause
+    assert_non_null(strstr(err.text, "it was written again, with all its 3 readings"));
+    append(s, &next);
+    next.point = 4;
+    append(s, &next);
+    store_close(reader, NULL);
+    assert_int_equal(store_close(s, NULL), 0);
+    assert_int_equal(fixture_files(&folder), 1);
+    s = opened(STORE_WRITE);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 5);
+    free(rows);
+    store_close(s, NULL);
+}
+
+static void a_replaced_file_is_kept_beside(void **state)
+{
+    (void)state;
+    const struct store_reading next = reading(1, 3, 1);
+    struct store_reading *rows;
+    struct gon_error err;
+    char rescued[160], text[8] = "";
+    struct store *s = created();
+    for (int point = 0; point < 3; point++) {
+        const struct store_reading r = reading(1, point, 1);
+        append(s, &r);
+    }
+    assert_int_equal(unlink(path), 0);
+    fixture_path(&folder, "0001-test.gonio-rescued", rescued, sizeof rescued);
+    int fd = open(path, O_CREAT | O_WRONLY, 0600);
+    assert_int_equal(write(fd, "other", 5), 5);
+    close(fd);
+    for (int again = 0; again < 2; again++) {
+        assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE);
+        assert_non_null(strstr(err.text, "what was measured is kept as"));
+        assert_non_null(strstr(err.text, rescued));
+    }
+    fd = open(path, O_RDONLY);
+    assert_int_equal(read(fd, text, 7), 5); // nobody touched it
+    close(fd);
+    assert_string_equal(text, "other");
+    assert_int_equal(unlink(path), 0); // taken away: it goes on
+    assert_int_equal(store_append_reading(s, &next, &err), GON_E_STORE);
+    append(s, &next);
+    assert_int_equal(store_read_readings(s, -1, &rows, NULL), 4);
+    free(rows);
+    store_close(s, NULL);
+    assert_int_equal(fixture_files(&folder), 1);
 }
 
 static void a_cut_file_is_noticed_at_the_next_reading(void **state)
@@ -1127,6 +1196,8 @@ int main(void)
         TEST(a_step_that_fails_changes_nothing),
         TEST(without_a_copy_nothing_is_changed),
         TEST(a_moved_file_is_noticed_at_the_next_reading),
+        TEST(a_removed_file_is_written_again),
+        TEST(a_replaced_file_is_kept_beside),
         TEST(a_cut_file_is_noticed_at_the_next_reading),
         TEST(a_removed_wal_loses_nothing),
         TEST(a_cut_wal_is_noticed_at_the_next_reading),

@@ -3,6 +3,7 @@
 #include "store_fixture.h"
 
 #include "campaign/reduce.h"
+#include "campaign/store_exclude.h"
 #include "campaign/store_verify.h"
 
 #include <fcntl.h>
@@ -70,6 +71,8 @@ static struct store *filled(void)
     assert_int_equal(reduce_campaign(s, &r, NULL), 0);
     assert_int_equal(store_append_reduction(s, 1, &r, NULL, NULL), 0);
     reduction_clear(&r);
+    assert_int_equal(
+        store_exclude(s, "3/1-2", &(struct store_decision){1, "dust", "Max"}, NULL), 2);
     return s;
 }
 
@@ -79,8 +82,9 @@ static void a_whole_file_is_whole_also_while_it_is_written(void **state)
     struct store *s = filled();
     struct store_verified seen = verified();
     assert_string_equal(found.texts, "");
-    assert_true(seen.version == 3 && seen.profiles == 1 && seen.reductions == 1);
+    assert_true(seen.version == 4 && seen.profiles == 1 && seen.reductions == 1);
     assert_int_equal(seen.readings, seen.points - 1 + 2);
+    assert_int_equal(seen.exclusions, 2);
     store_close(s, NULL);
     expect_whole();
 }
@@ -92,6 +96,9 @@ static void older_files_are_whole(void **state)
     expect_whole();
     unlink(path);
     make_from_sql("tests/golden/campaign_v2.sql");
+    expect_whole();
+    unlink(path);
+    make_from_sql("tests/golden/campaign_v3.sql");
     expect_whole();
 }
 
@@ -135,6 +142,18 @@ static const struct damage damages[] = {
      "meta: meta: wavelength_nm is 1061, the configuration or bench says 1060", -1, -1, -1, 1},
     {"DROP TRIGGER profile_UPDATE; UPDATE profile SET text = 'x'",
      "profile: profile 1 (sr830): its check value is wrong", -1, -1, -1, 2},
+    {"DROP TRIGGER exclusion_UPDATE; UPDATE exclusion SET point = 5 WHERE id = 2",
+     "exclusion: exclusion 2 (sweep 3, point 5, attempt 1): its check value is wrong", 3, 5, 1, 2},
+    {"DROP TRIGGER exclusion_DELETE; DELETE FROM exclusion WHERE id = 1",
+     "exclusion: exclusion 1 is missing before 2", -1, -1, -1, 2},
+    {"DROP TRIGGER exclusion_UPDATE; UPDATE exclusion SET what = 'gone' WHERE id = 1",
+     "exclusion: exclusion 1 (sweep 3, point 1, attempt 1): its check value", 3, 1, 1, 2},
+    {"INSERT INTO exclusion VALUES (3, 1, 3, 99, 1, 'excluded', 'x', 'x', 0)",
+     "reference: exclusion 3 is of sweep 3, point 99, attempt 1, which is not there", 3, 99, 1, 2},
+    {"INSERT INTO exclusion VALUES (3, 1, 3, 2, 1, 'replaced', 'x', 'x', 0);"
+     "INSERT INTO state (t_utc_ms, state, why) VALUES (1, 'done', '')",
+     "reference: the state is done, but sweep 3, point 2 is to be measured again, as exclusion 3", 3,
+     2, 1, 3},
     {"UPDATE reduced SET attempt = 7 WHERE sweep = 3 AND point = 0",
      "reference: reduction 1 uses sweep 3, point 0, attempt 7, which is not there", 3, 0, 7, 1},
     {"DELETE FROM reduced WHERE sweep = 3 AND point = 0", "reference: reduction 1 is of ", -1, -1,

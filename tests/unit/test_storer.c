@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // uses: daemon campaign drivers fit model base
 // The store and fit cores, stepped by notes over a real campaign file; no threads.
+#include "daemon/decision.h"
 #include "daemon/fitter.h"
 #include "daemon/material.h"
 #include "daemon/note.h"
@@ -24,6 +25,7 @@
 #include <dirent.h>
 #include <jansson.h>
 #include <math.h>
+#include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -244,6 +246,101 @@ static void a_campaign_goes_on_where_it_was_stopped(void **state)
     free(run);
 }
 
+// Returns the answer, to be freed.
+static struct note *decide(struct world *w, int run, const char *body)
+{
+    struct note *n = note_of(NOTE_DECIDE, run, NULL, NULL);
+    struct decision *d = NULL;
+    assert_int_equal(decision_parse(body, strlen(body), "Max", &d, NULL), 0);
+    n->last = d->verb == DECISION_REMEASURE;
+    n->thing = d;
+    n->drop = decision_free;
+    storer_step(w->storer, n);
+    return expect(w->to_main, NOTE_DECIDED);
+}
+
+static void decides(struct world *w, int run, const char *body, int readings, int done)
+{
+    struct note *n = decide(w, run, body);
+    if (n->err.code)
+        print_error("%s\n", n->err.text);
+    assert_int_equal(n->count, readings);
+    assert_int_equal(((struct run *)n->thing)->done, done);
+    note_free(n);
+}
+
+// In the file that is written, in one that is not, and what the next opening makes of it.
+static void readings_are_decided_about_wherever_the_file_is(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w);
+    struct run_material *m = open_run(w, run);
+    append_all(w, run->id, &m->plan, m->plan.count);
+    const int total = m->plan.count;
+    int sweep_2 = 0;
+    for (int i = 0; i < total; i++)
+        sweep_2 += m->plan.points[i].sweep == 2;
+    decides(w, run->id, "{\"do\":\"exclude\",\"readings\":\"1/3\",\"reason\":\"dust\"}", 1, total);
+    close_run(w, run->id, RUN_DONE);
+    decides(w, run->id, "{\"do\":\"restore\",\"readings\":\"1/3\",\"reason\":\"none\"}", 1, total);
+    decides(w, run->id, "{\"do\":\"remeasure\",\"sweep\":2,\"reason\":\"door\"}", sweep_2,
+            total - sweep_2 - 4);
+    run_material_free(m);
+    m = open_run(w, run);
+    for (int i = 0; i < total; i++) {
+        const struct plan_point *p = &m->plan.points[i];
+        assert_int_equal(p->done, p->sweep == 1 || p->sweep == 3);
+        assert_int_equal(p->attempts, 1);
+    }
+    run_material_free(m);
+    close_run(w, run->id, RUN_STOPPED);
+    struct note *n = decide(w, 9, "{\"do\":\"remeasure\",\"sweep\":2,\"reason\":\"x\"}");
+    assert_true(!n->thing && n->err.code == GON_E_INPUT);
+    note_free(n);
+    free(run);
+}
+
+static void a_run_is_not_done_while_a_sweep_is_open_again(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w);
+    struct run_material *m = open_run(w, run);
+    append_all(w, run->id, &m->plan, m->plan.count);
+    note_free(decide(w, run->id, "{\"do\":\"remeasure\",\"sweep\":1,\"reason\":\"door\"}"));
+    run_material_free(m);
+    struct note *n = note_of(NOTE_CLOSE, run->id, NULL, "");
+    n->state = RUN_DONE;
+    storer_step(w->storer, n);
+    n = expect(w->to_main, NOTE_CLOSED);
+    assert_true(n->last && n->err.code == 0);
+    note_free(n);
+    char text[16], why[80];
+    struct store *s;
+    assert_int_equal(store_open(run->path, STORE_READ, &s, NULL), 0);
+    assert_int_equal(store_read_state(s, text, sizeof text, why, sizeof why, NULL, NULL), 0);
+    assert_string_equal(text, "stopped");
+    assert_string_equal(why, "what is to be measured again comes next");
+    store_close(s, NULL);
+    free(run);
+}
+
+// It would be measured with another beam: nothing is written then.
+static void another_bench_measures_nothing_again(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w);
+    struct run_material *m = open_run(w, run);
+    append_all(w, run->id, &m->plan, m->plan.count);
+    close_run(w, run->id, RUN_DONE);
+    run_material_free(m);
+    w->bench.distance_mm += 1;
+    struct note *n = decide(w, run->id, "{\"do\":\"remeasure\",\"sweep\":1,\"reason\":\"x\"}");
+    assert_true(!n->thing && n->err.code == GON_E_REFUSED);
+    note_free(n);
+    decides(w, run->id, "{\"do\":\"exclude\",\"readings\":\"1/3\",\"reason\":\"dust\"}", 1, run->total);
+    free(run);
+}
+
 static bool list_profile(void *ctx, const struct store_kept_profile *p)
 {
     char *texts = ctx;
@@ -282,6 +379,35 @@ static void profiles_are_kept_at_the_beginning_and_when_it_goes_on(void **state)
     assert_string_equal(texts, "sr830=one az=two az=three ");
     store_each_event(s, 0, list_event, events, NULL);
     assert_string_equal(events, "");
+    store_close(s, NULL);
+    free(run);
+}
+
+static void an_older_file_that_goes_on_says_what_became_of_it(void **state)
+{
+    struct world *w = *state;
+    struct run *run = create(w);
+    struct store *s;
+    char events[2000] = "", wanted[700];
+    sqlite3 *db;
+    assert_int_equal(sqlite3_open(run->path, &db), SQLITE_OK);
+    assert_int_equal(
+        sqlite3_exec(db,
+                     "DROP TABLE profile; DROP VIEW excluded; DROP VIEW reading_brdf;"
+                     "DROP TABLE exclusion; ALTER TABLE reduction DROP COLUMN excluded;"
+                     "CREATE VIEW reading_brdf AS SELECT 1; PRAGMA user_version = 2",
+                     NULL, NULL, NULL),
+        SQLITE_OK);
+    sqlite3_close(db);
+    run_material_free(open_run(w, run));
+    close_run(w, run->id, RUN_STOPPED);
+    assert_int_equal(store_open(run->path, STORE_READ, &s, NULL), 0);
+    assert_int_equal(store_each_event(s, 0, list_event, events, NULL), 1);
+    snprintf(wanted, sizeof wanted,
+             "notice: the file was of version 2 and is now of version 4; as it was it is kept as "
+             "%s.v2-backup\n",
+             run->path);
+    assert_string_equal(events, wanted);
     store_close(s, NULL);
     free(run);
 }
@@ -588,7 +714,11 @@ int main(void)
 #define TEST(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         TEST(a_campaign_goes_on_where_it_was_stopped),
+        TEST(readings_are_decided_about_wherever_the_file_is),
+        TEST(a_run_is_not_done_while_a_sweep_is_open_again),
+        TEST(another_bench_measures_nothing_again),
         TEST(profiles_are_kept_at_the_beginning_and_when_it_goes_on),
+        TEST(an_older_file_that_goes_on_says_what_became_of_it),
         TEST(a_row_offered_again_is_accepted_only_when_it_is_the_same),
         TEST(a_wrong_campaign_is_complained_of_line_by_line),
         TEST(another_bench_is_refused),

@@ -53,6 +53,17 @@ static void links_are_taken_apart(void **state)
     assert_string_equal(l.place, "");
     assert_int_equal(link_parse("usbtmc:1313:8072:P00:1", LINK_TEXT, &l, NULL), 0);
     assert_string_equal(l.place, "P00:1");
+    assert_string_equal(link_serial_number(&l), "P00:1");
+    assert_int_equal(link_parse("serial:usb-0403:6001:A1:b?baud=9600", LINK_TEXT, &l, NULL), 0);
+    assert_true(l.kind == LINK_SERIAL && l.adapter && l.baud == 9600);
+    assert_true(l.vendor == 0x0403 && l.product == 0x6001);
+    assert_string_equal(l.place, "usb-0403:6001:A1:b");
+    assert_string_equal(link_serial_number(&l), "A1:b");
+    assert_int_equal(link_parse("modbus-rtu:usb-1A86:7523", LINK_MODBUS, &l, NULL), 0);
+    assert_true(l.adapter && l.vendor == 0x1a86 && l.product == 0x7523 && l.parity == 'E');
+    assert_string_equal(link_serial_number(&l), "");
+    assert_int_equal(link_parse("serial:/dev/serial/by-id/usb-FTDI", LINK_TEXT, &l, NULL), 0);
+    assert_false(l.adapter);
 }
 
 static void wrong_links_say_what_is_allowed(void **state)
@@ -75,6 +86,12 @@ static void wrong_links_say_what_is_allowed(void **state)
         {"serial:/dev/x?stop=3", LINK_TEXT, "allowed: 1, 2"},
         {"serial:/dev/x?speed=9600", LINK_TEXT, "unknown setting 'speed=9600'"},
         {"serial:/dev/x?", LINK_TEXT, "unknown setting ''"},
+        {"serial:usb-", LINK_TEXT, "after usb- comes VID:PID or VID:PID:SERIAL"},
+        {"serial:usb-FTDI_A1", LINK_TEXT, "four hexadecimal digits each"},
+        {"serial:usb-0403:600?baud=9600", LINK_TEXT, "four hexadecimal digits each"},
+        {"serial:usb-0403:6001:", LINK_TEXT, "VID:PID:SERIAL"},
+        {"serial:usb-0403:6001:A 1", LINK_TEXT, "VID:PID:SERIAL"},
+        {"modbus-rtu:usb-0403", LINK_MODBUS, "a path begins with /"},
         {"tcp:host", LINK_TEXT, "HOST:PORT"},
         {"tcp:host:", LINK_TEXT, "HOST:PORT"},
         {"tcp::4001", LINK_TEXT, "HOST:PORT"},
@@ -263,6 +280,28 @@ static void the_second_opener_hears_who_has_it(void **state)
     close(ready[0]);
     close(ready[1]);
     close(done[0]);
+    close(l.master);
+}
+
+static void *let_go_later(void *ctx)
+{
+    clk_sleep(clk_system(), CLK_MS(60), NULL);
+    close(*(int *)ctx);
+    return NULL;
+}
+
+// Closed, and still locked for a moment, as by somebody who looks into /proc/PID/fd.
+static void ones_own_lock_is_waited_for(void **state)
+{
+    (void)state;
+    pthread_t thread;
+    struct line l = line_new();
+    struct transport *t = open_link(l.link);
+    int copy = dup(transport_fd(t));
+    transport_close(t);
+    assert_int_equal(pthread_create(&thread, NULL, let_go_later, &copy), 0);
+    transport_close(open_link(l.link));
+    pthread_join(thread, NULL);
     close(l.master);
 }
 
@@ -587,6 +626,7 @@ int main(void)
         cmocka_unit_test(links_in_the_file_system_are_followed_by_their_text),
         cmocka_unit_test(what_cannot_be_opened_says_why),
         cmocka_unit_test(the_second_opener_hears_who_has_it),
+        cmocka_unit_test(ones_own_lock_is_waited_for),
         cmocka_unit_test(permission_denied_says_which_group_to_join),
         cmocka_unit_test(a_hang_up_is_gone_at_once),
         cmocka_unit_test(silence_is_a_link_error_at_the_deadline),

@@ -17,6 +17,7 @@ struct setting {
     struct instrument *in;
     struct cancel *cancel;
     int64_t cancel_at_ns;
+    int restarts; // to come, of theta_r, while it homes
 };
 
 static int set_up(void **state)
@@ -221,6 +222,52 @@ static void a_lost_home_position_is_never_trusted(void **state)
     assert_non_null(strstr(err.text, "axis theta_r: lost its home position"));
     assert_int_equal(travel_home(s->in, NULL, &err), 0);
     assert_int_equal(move(s, 10, 10, 0, &at, &err), 0);
+}
+
+static void restart_while_homing(void *ctx)
+{
+    struct setting *s = ctx;
+    struct simbench_axis *a = &s->b.axis[PART_THETA_R];
+    if (a->homing && !a->disabled && s->restarts > 0) {
+        s->restarts--;
+        a->homing = false;
+        a->disabled = true;
+        motion_halt(&s->b.world.axis[WORLD_THETA_R], s->b.clk.t_ns);
+    }
+}
+
+static void homing_that_a_restart_ended_is_begun_again(void **state)
+{
+    struct setting *s = *state;
+    struct gon_error err = {0};
+    s->b.axis[PART_THETA_R].homed = false;
+    motion_go(&s->b.world.axis[WORLD_THETA_R], 90.0, 20, 60, 60, s->b.clk.t_ns);
+    s->b.clk.t_ns += CLK_S(10);
+    s->restarts = 1;
+    instrument_watch(s->in, restart_while_homing, s);
+    if (travel_home(s->in, NULL, &err) < 0)
+        fail_msg("%s", err.text);
+    assert_true(s->b.axis[PART_THETA_R].homed);
+    assert_int_equal(s->restarts, 0);
+    // not for ever
+    s->b.axis[PART_THETA_R].homed = false;
+    motion_go(&s->b.world.axis[WORLD_THETA_R], 90.0, 20, 60, 60, s->b.clk.t_ns);
+    s->b.clk.t_ns += CLK_S(10);
+    s->restarts = 1000;
+    assert_int_equal(travel_home(s->in, NULL, &err), GON_E_DEVICE);
+    assert_non_null(strstr(err.text, "axis theta_r: not homed"));
+}
+
+// A drive that lost its power may have lost its enable with it: it answers, and does not move.
+static void a_restarted_controller_is_identified_before_it_homes(void **state)
+{
+    struct setting *s = *state;
+    struct gon_error err = {0};
+    s->b.axis[PART_THETA_R].homed = false;
+    s->b.axis[PART_THETA_R].disabled = true;
+    if (travel_home(s->in, NULL, &err) < 0)
+        fail_msg("%s", err.text);
+    assert_true(s->b.axis[PART_THETA_R].homed);
 }
 
 static void targets_beyond_the_travel_are_refused_before_moving(void **state)
@@ -500,6 +547,8 @@ int main(void)
         T(a_deadline_ends_a_move),
         T(an_alarm_ends_a_move_and_is_named),
         T(a_lost_home_position_is_never_trusted),
+        T(a_restarted_controller_is_identified_before_it_homes),
+        T(homing_that_a_restart_ended_is_begun_again),
         T(targets_beyond_the_travel_are_refused_before_moving),
         T(a_cancel_ends_a_move_within_a_slice),
         T(stations_by_name),

@@ -95,7 +95,7 @@ static int begin(void **state)
     noisy_init(&s->line, &s->slaves.port, 11, 0);
     struct clk *clk = vline_begin(&s->line.port);
     describe(s);
-    if (instrument_open(&s->bench, clk, &s->in, &err) < 0)
+    if (instrument_open(&s->bench, NULL, clk, &s->in, &err) < 0)
         fail_msg("%s", err.text);
     *state = s;
     return 0;

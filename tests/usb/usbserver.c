@@ -357,6 +357,11 @@ const char *usbserver_dir(const struct usbserver *s)
     return s->dir;
 }
 
+UMockdevTestbed *usbserver_testbed(const struct usbserver *s)
+{
+    return s->testbed;
+}
+
 int usbserver_add(struct usbserver *s, struct port *port, const char *end,
                   const struct sim_usb_identity *identity)
 {

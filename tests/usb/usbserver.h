@@ -19,6 +19,7 @@ struct usbserver;
 struct usbserver *usbserver_new(void); // ends the process when there is no testbed
 void usbserver_free(struct usbserver *s);
 const char *usbserver_dir(const struct usbserver *s);
+struct _UMockdevTestbed *usbserver_testbed(const struct usbserver *s); // for further devices
 
 // A device, not plugged in yet. Borrows port and strings. Returns its number.
 int usbserver_add(struct usbserver *s, struct port *port, const char *end,

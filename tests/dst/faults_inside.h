@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// What tests/dst/faults.c has in its table: how each fault is done (v: which kind of it) and
+// mended. Inside the faults_*.c files. Thread: one.
+#pragma once
+#include "tests/dst/trial.h"
+
+void fault_lose(struct trial *t, int v);
+void fault_lose_many(struct trial *t, int v);
+void fault_flip(struct trial *t, int v);
+void fault_wrong_header(struct trial *t, int v);
+void fault_late(struct trial *t, int v);
+void fault_mangle_bus(struct trial *t, int v);
+void fault_break_bus(struct trial *t, int v);
+void fault_hole(struct trial *t, int v);
+void fault_fill(struct trial *t);
+void fault_stale_number(struct trial *t, int v);
+void fault_wrong_echo(struct trial *t, int v);
+void fault_text_noise(struct trial *t, int v);
+void fault_text_cut(struct trial *t, int v);
+void fault_text_late(struct trial *t, int v);
+void fault_text_very_late(struct trial *t, int v);
+void fault_text_doubled(struct trial *t, int v);
+void fault_text_split(struct trial *t, int v);
+void fault_endless(struct trial *t, int v);
+void fault_echo_on(struct trial *t, int v);
+void fault_echo_off(struct trial *t);
+void fault_comma(struct trial *t, int v);
+void fault_no_number(struct trial *t, int v);
+void fault_unplug(struct trial *t, int v);
+void fault_plug(struct trial *t);
+void fault_exception_123(struct trial *t, int v);
+void fault_exception_4(struct trial *t, int v);
+void fault_exception_busy(struct trial *t, int v);
+void fault_restart(struct trial *t, int v);
+void fault_alarm(struct trial *t, int v);
+void fault_limit(struct trial *t, int v);
+void fault_clear_alarms(struct trial *t);
+void fault_freeze(struct trial *t, int v);
+void fault_thaw(struct trial *t);
+void fault_miss(struct trial *t, int v);
+void fault_miss_always(struct trial *t, int v);
+void fault_hit(struct trial *t);
+void fault_never_done(struct trial *t, int v);
+void fault_slip(struct trial *t, int v);
+void fault_stray(struct trial *t, int v);
+void fault_open_interlock(struct trial *t, int v);
+void fault_turn_key(struct trial *t);
+void fault_never_warm(struct trial *t, int v);
+void fault_warm(struct trial *t);
+void fault_weaken(struct trial *t, int v);
+void fault_laser_fault(struct trial *t, int v);
+void fault_go_out(struct trial *t, int v);
+void fault_ignore_off(struct trial *t, int v);
+void fault_obey_off(struct trial *t);
+void fault_light_by_itself(struct trial *t, int v);
+void fault_saturate(struct trial *t, int v);
+void fault_unsaturate(struct trial *t);
+void fault_lights_on(struct trial *t, int v);
+void fault_lights_off(struct trial *t);
+void fault_stick(struct trial *t, int v);
+void fault_unstick(struct trial *t);
+void fault_unlock(struct trial *t, int v);
+void fault_lock(struct trial *t);
+void fault_turn_knobs(struct trial *t, int v);
+void fault_detector_restarts(struct trial *t, int v);
+void fault_step_clock(struct trial *t, int v);
+void fault_suspend(struct trial *t, int v);
+void fault_fill_disk(struct trial *t, int v);
+void fault_break_disk(struct trial *t, int v);
+void fault_mend_disk(struct trial *t);
+void fault_lock_file(struct trial *t, int v);
+void fault_stall(struct trial *t, int v);
+void fault_move_file(struct trial *t, int v);
+void fault_put_back(struct trial *t);
+void fault_pause_by_hand(struct trial *t, int v);
+void fault_stop_by_hand(struct trial *t, int v);
