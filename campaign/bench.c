@@ -138,6 +138,11 @@ static const struct cfg_row station_rows[] = {
     REAL(bench_station, "theta_r_deg", theta_r_deg, "deg", -360, 360, NULL, "Its theta_r."),
     REAL(bench_station, "sample_mm", sample_mm, "mm", -1e4, 1e4, "0",
          "Where the sample stands, if that moves."),
+    TEXT(bench_station, "arrive", arrive, "",
+         "What a person does before the axes go there (\"take the sample out\"): a run waits, laser "
+         "off, for gonio ack."),
+    TEXT(bench_station, "leave", leave, "",
+         "Likewise before they go elsewhere (\"put the sample in\")."),
     {.name = "axes",
      .type = CFG_GROUPS,
      .offset = offsetof(struct bench_station, marks),
@@ -197,6 +202,8 @@ static const struct cfg_row daemon_rows[] = {
      .fallback = "[ ]",
      .help = "A program by its path and its arguments, started without a shell when a run is paused, "
              "failed or done; the last argument is the sentence that says so."},
+    REAL(bench_config, "step_limit_s", step_limit_s, "s", 0, 864000, "600",
+         "A person's step that is not acknowledged so long is told once more; 0: never."),
     REAL(bench_config, "notify_limit_s", notify.limit_s, "s", 0.1, 600, "10",
          "After this time that program is killed."),
     {0}};
@@ -259,6 +266,8 @@ const struct cfg_row bench_config_schema[] = {
              "detector; instead of detector.monitor_aux."},
     MANY("devices", devices, BENCH_DEVICES, bench_device, bench_device_rows, "",
          "Shutters, filter wheels, choppers and other selectors, and inputs."),
+    MANY("suspenders", suspenders, BENCH_SUSPENDERS, bench_suspender, bench_suspender_rows, "",
+         "Conditions under which a run pauses in the safe state."),
     {.name = "polarisation",
      .type = CFG_GROUP,
      .offset = offsetof(struct bench_config, polarisation),

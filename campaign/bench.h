@@ -6,6 +6,7 @@
 #include "base/err.h"
 #include "campaign/bench_devices.h"
 #include "campaign/bench_states.h"
+#include "campaign/bench_suspend.h"
 #include "campaign/kinematics.h"
 #include "campaign/polarisation.h"
 
@@ -20,7 +21,8 @@ enum {
     BENCH_NAME = 32,
     BENCH_LINK = 256,
     BENCH_FOLDER = 256,
-    BENCH_NOTIFY = 12
+    BENCH_NOTIFY = 12,
+    BENCH_STEP = 160
 };
 
 enum bench_regime {
@@ -89,6 +91,8 @@ struct bench_station {
     double theta_i_deg, theta_r_deg, sample_mm;
     struct bench_mark marks[BENCH_AXES];
     int marks_count;
+    char arrive[BENCH_STEP], leave[BENCH_STEP]; // what a person does before the axes go there, and
+                                                // before they go elsewhere; "": nothing
     struct bench_place places[BENCH_DEVICES]; // of devices, while the axes stand there
     int places_count;
 };
@@ -134,10 +138,13 @@ struct bench_config {
     struct bench_monitor monitor;
     struct bench_device devices[BENCH_DEVICES];
     int devices_count;
+    struct bench_suspender suspenders[BENCH_SUSPENDERS];
+    int suspenders_count;
     struct bench_polarisation polarisation;
     struct bench_station stations[BENCH_STATIONS];
     int stations_count;
     char directory[BENCH_FOLDER]; // where campaigns go; "": catalog_directory decides
+    double step_limit_s;          // of a person's step, after which it is told again; 0: none
     struct {
         char argv[BENCH_NOTIFY][256]; // a program and its arguments
         int argc;                     // 0: nobody is told

@@ -326,5 +326,5 @@ int bench_check(struct cfg_file *f, const struct bench_config *b)
         mistakes += cfg_complain(
             f, "stations", "station 'beam' is missing: where the detector looks into the beam");
     return mistakes + marks + outlines + maps + check_links(f, b) + check_notify(f, b) +
-           bench_devices_check(f, b) + bench_states_check(f, b);
+           bench_devices_check(f, b) + bench_states_check(f, b) + bench_suspend_check(f, b);
 }

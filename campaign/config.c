@@ -71,6 +71,21 @@ static const struct cfg_row dark_rows[] = {
           "Samples averaged with the laser off, before and after."),
     {0}};
 
+static const struct cfg_row step_rows[] = {
+    {.name = "before_sweep",
+     .type = CFG_INT,
+     .offset = offsetof(struct campaign_step, before_sweep),
+     .min = 0,
+     .max = CAMPAIGN_ANGLES + 1,
+     .help = "Which sweep it comes before, counted from 1; 0: before everything, also the dark; one "
+             "more than there are sweeps: before the closing references."},
+    {.name = "text",
+     .type = CFG_STRING,
+     .offset = offsetof(struct campaign_step, text),
+     .size = CAMPAIGN_STEP,
+     .help = "What is to be done: \"turn the sample by 90 deg\"."},
+    {0}};
+
 static const struct cfg_row fit_rows[] = {
     CHOICE("method", fit.method, fit_method_names, "\"memetic\"",
            "The search; \"paper\" is the published algorithm."),
@@ -113,6 +128,15 @@ static const struct cfg_row campaign_rows[] = {
     REAL("blind_half_deg", blind_half_deg, "deg", 0, 30, "0",
          "Skip |theta_r + theta_i| below this, where the detector stands in the beam; 0: skip "
          "nothing."),
+    {.name = "steps",
+     .type = CFG_GROUPS,
+     .offset = AT(steps),
+     .size = CAMPAIGN_STEPS,
+     .stride = sizeof(struct campaign_step),
+     .count_offset = AT(steps_count),
+     .rows = step_rows,
+     .fallback = "",
+     .help = "What a person does before a sweep: the run waits, laser off, for gonio ack."},
     GROUP("readings", readings_rows, "", "On the sample."),
     GROUP("beam", beam_rows, "", "In the beam."),
     GROUP("dark", dark_rows, "", "With the laser off."),
@@ -175,9 +199,30 @@ static int check_polarisation(struct cfg_file *f, const struct campaign_config *
            check_list(f, "pol_out", c->pol_out, c->pol_out_count);
 }
 
+static int check_steps(struct cfg_file *f, const struct campaign_config *c)
+{
+    char path[50];
+    int mistakes = 0;
+    for (int i = 0; i < c->steps_count; i++) {
+        snprintf(path, sizeof path, "campaign.steps[%d].before_sweep", i);
+        if (c->steps[i].before_sweep > c->theta_i_count + 1)
+            mistakes += cfg_complain(f, path, "there are %d sweeps; allowed 0..%d",
+                                     c->theta_i_count, c->theta_i_count + 1);
+        for (int k = 0; k < i; k++)
+            if (c->steps[i].before_sweep == c->steps[k].before_sweep) {
+                mistakes += cfg_complain(f, path, "has a step already; say both in one text");
+                break;
+            }
+        snprintf(path, sizeof path, "campaign.steps[%d].text", i);
+        if (!*c->steps[i].text)
+            mistakes += cfg_complain(f, path, "empty; say what is to be done");
+    }
+    return mistakes;
+}
+
 static int check(struct cfg_file *f, const struct campaign_config *c)
 {
-    int mistakes = check_polarisation(f, c);
+    int mistakes = check_polarisation(f, c) + check_steps(f, c);
     if (!(c->from_deg < c->to_deg))
         mistakes +=
             cfg_complain(f, "campaign.theta_r.from_deg", "not below to_deg = %.9g deg", c->to_deg);

@@ -13,6 +13,8 @@ enum {
     CAMPAIGN_ANGLES = 100,
     CAMPAIGN_NAME = 64,
     CAMPAIGN_NOTES = 1024,
+    CAMPAIGN_STEPS = 16,
+    CAMPAIGN_STEP = 160,
     CAMPAIGN_STATES = 16,                            // in a list
     CAMPAIGN_CHANNELS = (POL_KNOWN + 1) * POL_KNOWN, // all there can be
     POL_IN_LASER = POL_UNKNOWN
@@ -21,6 +23,11 @@ enum {
 enum campaign_combine {
     CAMPAIGN_EACH, // every pol_in with every pol_out, pol_in by pol_in
     CAMPAIGN_PAIRS // the first with the first, the second with the second, ...
+};
+
+struct campaign_step { // what a person does
+    int before_sweep;  // 0: before everything; sweeps + 1: before the closing references
+    char text[CAMPAIGN_STEP];
 };
 
 struct campaign_channel { // as pol_in and pol_out of the configuration
@@ -43,6 +50,8 @@ struct campaign_config {
     int pol_combine;       // enum campaign_combine
     double blind_half_deg; // |theta_r + theta_i| < this is skipped: the detector shadows the beam;
                            // 0: nothing
+    struct campaign_step steps[CAMPAIGN_STEPS];
+    int steps_count;
     int readings, dark_readings, beam_readings; // samples averaged a point
     struct {
         int method, weighting, diffuse; // enum fit_method, fit_weighting, brdf_diffuse

@@ -4,6 +4,7 @@
 #include "base/units.h"
 #include "campaign/plan_bench.h"
 #include "campaign/plan_states.h"
+#include "campaign/plan_steps.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -51,6 +52,7 @@ void plan_clear(struct plan *p)
     free(p->points);
     free(p->skips);
     free(p->warnings);
+    free(p->steps);
     *p = (struct plan){0};
 }
 
@@ -467,6 +469,8 @@ int plan_make(const struct campaign_config *config, const struct bench_config *b
     if (rc >= 0)
         rc = add_all(&m, err);
     free(m.directions_udeg);
+    if (rc >= 0)
+        rc = plan_add_steps(config, bench, &m.plan, err);
     if (rc >= 0 && m.plan.samples == 0)
         rc = gon_fail(err, GON_E_INPUT, "nothing is left to measure: all %d points are skipped",
                       m.plan.skips_count);

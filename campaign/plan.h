@@ -49,6 +49,12 @@ struct plan_skip {
     enum plan_skip_reason reason;
 };
 
+struct plan_step { // what a person does, as campaign/plan_steps.h
+    int before;    // index of a point
+    int sweep;     // of that
+    char text[CAMPAIGN_STEP];
+};
+
 struct plan {
     struct plan_point *points;
     int count;   // all points: samples and references
@@ -56,6 +62,8 @@ struct plan {
     int sweeps;  // one a theta_i, numbered 1..sweeps; one of which nothing is left has no points
     struct plan_skip *skips;
     int skips_count;
+    struct plan_step *steps; // of a plan that was made, not of one that was read
+    int steps_count;
     char (*warnings)[240]; // one sentence each
     int warnings_count;
     double duration_s; // estimate; NAN without a bench

@@ -133,16 +133,20 @@ static double cosine(const struct reduction *r, const struct reduced_point *p)
 }
 
 // False when this point has no value: at or below the horizon, or with the light gone.
-static bool reduce_point(const struct reduction *r, const struct store_reading *row,
-                         const struct reduce_channel *channel, struct reduced_point *p)
+static bool reduce_point(const struct reduction *r, const struct reduce_references *f,
+                         const struct store_reading *row, const struct reduce_channel *channel,
+                         struct reduced_point *p)
 {
-    const double monitor =
-        isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(r->reference.dark_monitor_v);
-    const double scale =
-        1 / (channel->beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
+    const int64_t t_ms = row->t_utc_ms;
+    const struct reduce_series *ratio = &f->beam[p->pol_in].ratio;
+    const double dark_monitor_v = reduce_series_at(&f->dark_monitor, t_ms);
+    const double beam_ratio =
+        channel->beam_ratio * (reduce_series_at(ratio, t_ms) / reduce_series_mean(ratio));
+    const double monitor = isnan(row->monitor_v) ? 1 : row->monitor_v - without_nan(dark_monitor_v);
+    const double scale = 1 / (beam_ratio * r->omega_sr * cosine(r, p)); // f = scale (S - D) / M
     if (!(cosine(r, p) > 1e-6) || !(monitor > 0))
         return false;
-    p->f_per_sr = scale * (row->signal_v - r->reference.dark_signal_v) / monitor;
+    p->f_per_sr = scale * (row->signal_v - reduce_series_at(&f->dark_signal, t_ms)) / monitor;
     const double u_signal = sample_u_v(&r->noise, row->signal_v) / sqrt(row->count);
     const double u_monitor = r->noise.rel_monitor / sqrt(row->count);
     p->u_a_per_sr = hypot(scale * hypot(u_signal, r->u_dark_v) / monitor, p->f_per_sr * u_monitor);
@@ -150,8 +154,9 @@ static bool reduce_point(const struct reduction *r, const struct store_reading *
     return isfinite(p->f_per_sr);
 }
 
-static int reduce_points(struct reduction *r, const struct plan *plan,
-                         const struct store_reading *rows, int count, struct gon_error *err)
+static int reduce_points(struct reduction *r, const struct reduce_references *f,
+                         const struct plan *plan, const struct store_reading *rows, int count,
+                         struct gon_error *err)
 {
     r->points = calloc((size_t)plan->samples + 1, sizeof *r->points);
     if (!r->points)
@@ -171,7 +176,7 @@ static int reduce_points(struct reduction *r, const struct plan *plan,
                                     .theta_i_deg = units_deg_of_udeg(row->theta_i_udeg),
                                     .theta_r_deg = units_deg_of_udeg(row->theta_r_udeg),
                                     .weight = point->weight};
-        if (reduce_point(r, row, reduce_channel_of(r, p->pol_in, p->pol_out), p))
+        if (reduce_point(r, f, row, reduce_channel_of(r, p->pol_in, p->pol_out), p))
             r->count++;
         else
             r->left_out++;
@@ -193,12 +198,13 @@ static int reduce_dark(struct reduction *r, const struct reduce_references *f,
                        struct gon_error *err)
 {
     int excluded_beams = 0;
-    r->darks = f->dark_signal.n;
+    r->darks = f->dark_signal.count;
     for (int i = 0; i < POL_COUNT; i++)
-        r->beams += f->beam[i].signal.n;
+        r->beams += f->beam[i].signal.count;
     r->reference = reduce_reference_means(f);
-    r->u_dark_v = hypot(reduce_mean_u(&f->dark_signal),
-                        without_nan(r->noise.floor_v) / sqrt(f->dark_samples));
+    r->u_dark_v = hypot(reduce_series_u(&f->dark_signal),
+                        without_nan(r->noise.floor_v) /
+                            sqrt(reduce_series_samples(&f->dark_signal, f->dark_samples)));
     for (int i = 0; i < POL_COUNT; i++)
         excluded_beams += f->beam[i].excluded;
     if (!r->darks && f->dark_excluded)
@@ -215,17 +221,17 @@ static int check_beam(const struct reduction *r, const struct reduce_beam *beam,
                       struct gon_error *err)
 {
     char what[40];
-    const double ratio = reduce_mean_of(&beam->ratio);
+    const double ratio = reduce_series_mean(&beam->ratio);
     snprintf(what, sizeof what, "beam (pol_in = \"%s\")",
              polarisation_name((enum polarisation)pol_in));
-    if (!beam->signal.n && beam->excluded)
+    if (!beam->signal.count && beam->excluded)
         return none_left(what, beam->excluded, err);
-    if (!beam->signal.n)
+    if (!beam->signal.count)
         return gon_fail(err, GON_E_INPUT,
                         "no beam reading yet of pol_in = \"%s\": without it there is no absolute "
                         "BRDF",
                         polarisation_name((enum polarisation)pol_in));
-    if (ratio > 0 && isfinite(ratio))
+    if (reduce_series_least(&beam->ratio) > 0 && isfinite(ratio))
         return GON_OK;
     return gon_fail(err, GON_E_INPUT,
                     "the beam (%.4g V, monitor %.4g V) is not above the dark (%.4g V, monitor "
@@ -243,7 +249,7 @@ static int add_channel(struct reduction *r, const struct reduce_references *f,
     int rc = check_beam(r, beam, p->pol_in, err);
     if (rc < 0)
         return rc;
-    const double ratio = reduce_mean_of(&beam->ratio),
+    const double ratio = reduce_series_mean(&beam->ratio),
                  signal_v = r->reference.beam_signal_v[p->pol_in];
     const double noise = without_nan(sample_u_v(&r->noise, signal_v)) / signal_v;
     const double shared = hypot(r->u_radius_rel, hypot(r->u_distance_rel, r->u_linearity_rel));
@@ -251,8 +257,9 @@ static int add_channel(struct reduction *r, const struct reduce_references *f,
     c->beam_ratio = ratio * reduce_analyser(&bench->polarisation, p->pol_in, beam->out, p->pol_out,
                                             &c->u_analyser_rel);
     c->beam_ratio /= bench_beam_passes(bench, &c->u_filter_rel);
-    c->u_beam_rel = hypot(reduce_mean_u(&beam->ratio) / ratio,
-                          hypot(noise, r->noise.rel_monitor) / sqrt(beam->samples));
+    c->u_beam_rel = hypot(reduce_series_u(&beam->ratio) / ratio,
+                          hypot(noise, r->noise.rel_monitor) /
+                              sqrt(reduce_series_samples(&beam->ratio, beam->samples)));
     c->u_scale_rel = hypot(hypot(c->u_beam_rel, hypot(c->u_analyser_rel, c->u_filter_rel)), shared);
     r->u_beam_rel = fmax(r->u_beam_rel, c->u_beam_rel);
     r->u_scale_rel = fmax(r->u_scale_rel, c->u_scale_rel);
@@ -281,18 +288,21 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
                struct gon_error *err)
 {
     struct reduction r = {.omega_sr = bench_omega_sr(bench), .regime = bench->regime};
-    const struct reduce_references f = reduce_references_of(plan, rows, count, plan->sweeps + 1);
+    struct reduce_references f;
     r.noise = reduce_noise_of(plan, rows, count);
     for (int i = 0; i < count; i++)
         r.excluded += !(rows[i].flags & STORE_REJECTING) && !store_reading_counts(&rows[i]);
     r.u_radius_rel = 2 * bench->u_aperture_radius_mm / bench->aperture_radius_mm;
     r.u_distance_rel = 2 * bench->u_distance_mm / bench->distance_mm;
     r.u_linearity_rel = bench->detector.u_linearity_rel;
-    int rc = reduce_dark(&r, &f, err);
+    int rc = reduce_references_of(plan, rows, count, &f, err);
+    if (rc >= 0)
+        rc = reduce_dark(&r, &f, err);
     if (rc >= 0)
         rc = reduce_channels(&r, &f, bench, plan, err);
     if (rc >= 0)
-        rc = reduce_points(&r, plan, rows, count, err);
+        rc = reduce_points(&r, &f, plan, rows, count, err);
+    reduce_references_clear(&f);
     if (rc < 0)
         return rc;
     reduce_add_leaks(&r, plan, bench);

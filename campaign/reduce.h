@@ -7,9 +7,14 @@
 //
 // S signal, M monitor (1 without one), D dark with the laser off, 0 the beam; Omega = pi r^2/d^2.
 // Opening and closing beam and dark are averaged; half their difference is part of their
-// uncertainty. Where sweeps were measured again there are more of them, of days that may differ: all
-// that count are averaged, and half of the largest difference is part of the uncertainty, which then
-// holds for the sweeps of each day. Excluded readings (campaign/store_exclude.h) count nowhere. Angles are those of the encoders.
+// uncertainty. Angles are those of the encoders. Excluded readings (campaign/store_exclude.h) count
+// nowhere.
+//
+// References may be measured again, as further accepted readings of the same points: the opening
+// ones after a gap (a pause, a stop), opening and closing ones with a sweep that is measured again.
+// All that count are kept. Each reading is then reduced with what the references before and after
+// it give, linear in time between them (campaign/reduce_series.h), so that each day has its own;
+// their uncertainty has half of the largest difference of neighbours, for all readings.
 //
 // Each reading is divided by the beam of its own pol_in, which is measured without analyser; f of
 // a reading behind the analyser is divided by its transmission T as well, so that f = 1/2 a^T F g
@@ -99,7 +104,7 @@ int reduce_run(const struct bench_config *bench, const struct plan *plan,
 int reduce_campaign(struct store *s, struct reduction *ret_reduction, struct gon_error *err);
 void reduction_clear(struct reduction *r); // frees what it holds, not r; NULL is fine
 
-// Means of the opening references (sweep 0), for provisional values after a resume.
+// The newest opening references (sweep 0), for provisional values after a resume.
 struct reduce_reference reduce_opening(const struct plan *plan, const struct store_reading *rows,
                                        int count);
 

@@ -75,6 +75,22 @@ static void check_positions(struct checked *c, const struct profile *p, int inde
     }
 }
 
+// What suspenders want to see of it.
+static void check_values(struct checked *c, const struct profile *p, int index)
+{
+    for (int i = 0; i < c->bench->suspenders_count; i++) {
+        struct bench_condition when;
+        const char *value;
+        bench_condition_parse(c->bench->suspenders[i].when, &when, NULL);
+        for (int k = 0; k < when.terms; k++)
+            if (bench_term_device(c->bench, &when.term[k], &value) == index &&
+                profile_value(p, value) < 0)
+                complain(c, when.term[k].name,
+                         "suspenders[%d].when = \"%s\": profile %s has no value '%s'", i,
+                         c->bench->suspenders[i].when, p->name, value);
+    }
+}
+
 static void check_device(struct checked *c, int index)
 {
     const struct bench_device *d = &c->bench->devices[index];
@@ -90,7 +106,9 @@ static void check_device(struct checked *c, int index)
     if (p->protocol != (*d->bus ? PROFILE_MODBUS : PROFILE_MESSAGE))
         complain(c, d->name, "devices[%d]: profile %s is for %s", index, p->name,
                  *d->bus ? "a link of its own, not a bus" : "a Modbus bus: give bus and unit");
-    if (!inputs)
+    if (inputs)
+        check_values(c, p, index);
+    else
         check_positions(c, p, index);
     free(p);
 }

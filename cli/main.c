@@ -10,11 +10,10 @@
 #include <string.h>
 
 static const struct verb *const verbs[] = {
-    &verb_plan,    &verb_run,     &verb_watch,     &verb_status, &verb_devices, &verb_stop,
-    &verb_laser,   &verb_pause,   &verb_resume,    &verb_queue,  &verb_control, &verb_list,
-    &verb_show,    &verb_exclude, &verb_restore,   &verb_remeasure,
-    &verb_verify,  &verb_backup,  &verb_fit,       &verb_model,  &verb_check,   &verb_doctor,
-    &verb_profile,
+    &verb_plan,   &verb_run,   &verb_watch,   &verb_status,  &verb_devices,   &verb_stop,
+    &verb_laser,  &verb_pause, &verb_resume,  &verb_ack,     &verb_queue,     &verb_control,
+    &verb_list,   &verb_show,  &verb_exclude, &verb_restore, &verb_remeasure, &verb_verify,
+    &verb_backup, &verb_fit,   &verb_model,   &verb_check,   &verb_doctor,    &verb_profile,
 };
 enum { VERBS = sizeof verbs / sizeof *verbs };
 

@@ -107,6 +107,31 @@ static void say_states(const struct plan *p, bool has_bench)
     fprintf(stderr, "\n");
 }
 
+// In a terminal and in a log, before the warnings.
+static void say_steps(const struct plan *p)
+{
+    for (int i = 0; i < p->steps_count; i++) {
+        const struct plan_step *s = &p->steps[i];
+        char when[60];
+        if (s->sweep == 0)
+            snprintf(when, sizeof when, "before the opening references");
+        else if (s->sweep > p->sweeps)
+            snprintf(when, sizeof when, "before the closing references");
+        else
+            snprintf(when, sizeof when, "before sweep %d", s->sweep);
+        fprintf(stderr, "step: %s: %s (the run waits for gonio ack)\n", when, s->text);
+    }
+}
+
+static json_t *steps_json(const struct plan *p)
+{
+    json_t *all = json_array();
+    for (int i = 0; i < p->steps_count; i++)
+        json_array_append_new(all, json_pack("{s:i, s:i, s:s}", "before", p->steps[i].before,
+                                             "sweep", p->steps[i].sweep, "text", p->steps[i].text));
+    return all;
+}
+
 static void print_plan(const struct plan *p, const struct campaign_config *c, const char *path,
                        bool has_bench)
 {
@@ -141,6 +166,7 @@ static void print_plan(const struct plan *p, const struct campaign_config *c, co
     }
     table_print(t, stdout);
     fflush(stdout);
+    say_steps(p);
     for (int i = 0; i < p->warnings_count; i++)
         out_warn("%s", p->warnings[i]);
     fprintf(stderr, "%d %s.  Start it with:  gonio run %s\n", p->warnings_count,
@@ -212,6 +238,7 @@ static void print_json(const struct plan *p, const struct campaign_config *c, bo
     json_object_set_new(o, "states", states_json(p, has_bench));
     json_object_set_new(o, "order", points_json(p, has_bench));
     json_object_set_new(o, "skipped", skips_json(p));
+    json_object_set_new(o, "steps", steps_json(p));
     json_object_set_new(o, "warnings", warnings);
     out_json(o);
     json_decref(o);

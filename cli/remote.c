@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// status, stop, pause, resume: one question to the daemon each.
+// status, stop, pause, ack: one question to the daemon each.
 #include "cli/remote.h"
 
 #include "campaign/catalog.h"
@@ -14,9 +14,29 @@
 
 struct options {
     struct remote_options remote;
+    bool now; // of pause
+    const char *reason; // or note
 };
 
 static const struct option_row rows[] = {
+    REMOTE_SOCKET(struct options),
+    REMOTE_JSON(struct options),
+    VERB_OPTIONS_END,
+};
+
+static const struct option_row pause_rows[] = {
+    {"--now", OPTION_FLAG, offsetof(struct options, now), NULL, 0, 0,
+     "at once: the reading in progress is given up"},
+    {"--reason", OPTION_TEXT, offsetof(struct options, reason), "TEXT", 0, 0,
+     "what for, for the others and the file"},
+    REMOTE_SOCKET(struct options),
+    REMOTE_JSON(struct options),
+    VERB_OPTIONS_END,
+};
+
+static const struct option_row ack_rows[] = {
+    {"--note", OPTION_TEXT, offsetof(struct options, reason), "TEXT", 0, 0,
+     "what there is to say about it, for the file"},
     REMOTE_SOCKET(struct options),
     REMOTE_JSON(struct options),
     VERB_OPTIONS_END,
@@ -191,11 +211,29 @@ static void print_device(const json_t *d)
     putchar('\n');
 }
 
+// Those that keep the run, or would keep one.
+static void print_suspender(const json_t *s)
+{
+    const json_t *left = json_object_get(s, "left_s");
+    if (!json_is_true(json_object_get(s, "keeps")))
+        return;
+    printf("suspended by \"%s\": %s", text_of(s, "name"), text_of(s, "text"));
+    if (json_is_true(json_object_get(s, "holds")))
+        printf("; must then be quiet for %.3g s", json_number_value(left));
+    else if (json_number_value(left) > 0)
+        printf("; quiet now, for %.0f s more", json_number_value(left));
+    if (!strcmp(text_of(s, "resume"), "manual"))
+        printf("; waits for gonio resume");
+    putchar('\n');
+}
+
 static void print_run(const json_t *r)
 {
     const char *text = text_of(r, "text");
     printf("run %d    %s (%s)%s%s\n", whole(r, "run"), text_of(r, "state"), text_of(r, "name"),
            *text ? ": " : "", text);
+    if (*text_of(r, "asks"))
+        printf("to do     %s; when that is done: gonio ack\n", text_of(r, "asks"));
     printf("progress  sweep %d of %d, %d of %d readings", whole(r, "sweep"), whole(r, "sweeps"),
            whole(r, "done"), whole(r, "total"));
     put_number(r, "left_s", ", ", 0, "s left");
@@ -225,6 +263,7 @@ static void print_status(const json_t *s)
         printf("control   %s\n", text_of(json_object_get(s, "control"), "name"));
     if (json_is_true(json_object_get(s, "queue_held")))
         printf("queue     held; look: gonio queue, go on: gonio queue release\n");
+    json_array_foreach(json_object_get(s, "suspenders"), i, each) print_suspender(each);
     json_array_foreach(json_object_get(s, "devices"), i, each) print_device(each);
     if (*text_of(s, "last_error"))
         printf("last error: %s\n", text_of(s, "last_error"));
@@ -306,12 +345,24 @@ const struct verb verb_stop = {"stop",
 
 static int run_pause(const struct verb *verb, int argc, char **argv)
 {
-    json_t *reply = NULL;
-    int status = command(verb, argc, argv, "/api/v1/pause", &reply);
+    struct options o = {0};
+    int status = EXIT_OK;
+    if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
+        return EXIT_INPUT;
+    json_t *body = json_pack("{s:b, s:s}", "now", o.now, "reason", o.reason ? o.reason : "");
+    if (!body) {
+        out_say("--reason is no UTF-8");
+        return EXIT_INPUT;
+    }
+    json_t *reply = remote_call(&o.remote, "POST", "/api/v1/pause", body, &status);
+    json_decref(body);
+    if (reply && o.remote.json)
+        out_json(reply);
     bool already = !strcmp(text_of(reply, "state"), "paused");
     if (reply)
         fprintf(stderr, "run %d %s. Go on with: gonio resume\n", whole(reply, "run"),
                 already ? "stays paused"
+                : o.now ? "pauses now, and gives the reading in progress up; the laser goes off"
                         : "pauses after the reading in progress; the laser goes off then");
     json_decref(reply);
     return status;
@@ -322,6 +373,40 @@ const struct verb verb_pause = {
     "",
     "hold the run, laser off, until gonio resume",
     "Holds the run that has the bench after the reading in progress: laser off, axes still. A run\n"
-    "that waits for a device would go on by itself; paused, it waits for gonio resume.\n",
-    rows,
+    "that waits for a device would go on by itself; paused, it waits for gonio resume. Name, user\n"
+    "and reason stand in the campaign file.\n",
+    pause_rows,
     run_pause};
+
+// --- ack -----------------------------------------------------------------------------------------
+
+static int run_ack(const struct verb *verb, int argc, char **argv)
+{
+    struct options o = {0};
+    int status = EXIT_OK;
+    if (verb_take(verb, argc, argv, &o, NULL, 0, 0) < 0)
+        return EXIT_INPUT;
+    json_t *body = json_pack("{s:s}", "note", o.reason ? o.reason : "");
+    if (!body) {
+        out_say("--note is no UTF-8");
+        return EXIT_INPUT;
+    }
+    json_t *reply = remote_call(&o.remote, "POST", "/api/v1/ack", body, &status);
+    json_decref(body);
+    if (reply && o.remote.json)
+        out_json(reply);
+    else if (reply)
+        fprintf(stderr, "run %d goes on\n", whole(reply, "run"));
+    json_decref(reply);
+    return status;
+}
+
+const struct verb verb_ack = {
+    "ack",
+    "",
+    "what the run waits for a person to do is done",
+    "A plan may wait for a person (insert the mirror, change the sample): gonio status says for what,\n"
+    "the laser is off meanwhile. This says that it is done; the run goes on, and the laser comes on.\n"
+    "Name, user and note stand in the campaign file.\n",
+    ack_rows,
+    run_ack};

@@ -6,10 +6,10 @@
 // What the shell sees; scripts depend on it.
 enum exit_status {
     EXIT_OK = 0,
-    EXIT_FAILED = 1,      // the instrument or the fit failed
-    EXIT_INPUT = 2,       // bad arguments, configuration or input file
+    EXIT_FAILED = 1, // the instrument or the fit failed
+    EXIT_INPUT = 2,  // bad arguments, configuration or input file
     EXIT_NO_DAEMON = 3,
-    EXIT_REFUSED = 4,     // busy, interlock, somebody else has control
+    EXIT_REFUSED = 4, // busy, interlock, somebody else has control
     EXIT_INTERRUPTED = 130
 };
 
@@ -26,7 +26,7 @@ struct verb {
 extern const struct verb verb_plan, verb_check;
 extern const struct verb verb_devices, verb_doctor;
 extern const struct verb verb_run, verb_watch;
-extern const struct verb verb_status, verb_stop, verb_pause, verb_resume, verb_remeasure;
+extern const struct verb verb_status, verb_stop, verb_pause, verb_resume, verb_ack, verb_remeasure;
 extern const struct verb verb_queue, verb_control;
 extern const struct verb verb_list, verb_show, verb_verify, verb_backup;
 extern const struct verb verb_exclude, verb_restore;
@@ -38,4 +38,7 @@ extern const struct verb verb_laser;
 int verb_take(const struct verb *verb, int argc, char **argv, void *target, const char **operands,
               int least, int most);
 
-#define VERB_OPTIONS_END {NULL, OPTION_FLAG, 0, NULL, 0, 0, NULL}
+#define VERB_OPTIONS_END                                                                           \
+    {                                                                                              \
+        NULL, OPTION_FLAG, 0, NULL, 0, 0, NULL                                                     \
+    }

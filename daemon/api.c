@@ -15,6 +15,8 @@
 #include <string.h>
 #include <unistd.h>
 
+enum { MOST_REASON = 160 };
+
 struct call {
     struct hub *hub;
     const struct http_request *request;
@@ -118,6 +120,7 @@ static struct http_reply get_status(const struct call *c)
     json_object_set_new(o, "control", view_control(hub_control(c->hub)));
     json_object_set_new(o, "queue_held", json_boolean(queue_is_held(q)));
     json_object_set_new(o, "run", active ? view_run(active, true) : json_null());
+    json_object_set_new(o, "suspenders", s.snapshot ? view_suspenders(s.snapshot) : json_array());
     json_object_set_new(o, "devices", s.snapshot ? view_devices(s.snapshot) : json_array());
     return reply(200, view_text(o));
 }
@@ -249,10 +252,71 @@ static struct http_reply told(const struct call *c, int run, const struct gon_er
     return reply(202, hub_submitted(c->hub, run, hub_event_id(c->hub)));
 }
 
+// " anna (uid 1000): lunch": behind "by the operator".
+static void say_who(const struct call *c, const char *reason, char *text, size_t size)
+{
+    snprintf(text, size, "%s%s (uid %ld)%s%s", *c->request->name ? " " : "", c->request->name,
+             c->request->uid, *reason ? ": " : "", reason);
+}
+
+// One line, which is shown and kept: no control characters.
+static bool is_line(const char *text, size_t most)
+{
+    for (const char *p = text; *p; p++)
+        if ((unsigned char)*p < ' ' || *p == 0x7f)
+            return false;
+    return strlen(text) <= most;
+}
+
+// An object; none is an empty one.
+static json_t *body_of(const struct call *c, json_error_t *e)
+{
+    return c->request->size
+               ? json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, e)
+               : json_object();
+}
+
 static struct http_reply post_pause(const struct call *c)
 {
+    json_error_t e;
     struct gon_error err;
-    int run = hub_pause(c->hub, &err);
+    char by[300];
+    const char *reason = "";
+    int now = 0;
+    json_t *body = body_of(c, &e);
+    const bool right = body && json_unpack_ex(body, &e, JSON_STRICT, "{s?b, s?s}", "now", &now,
+                                              "reason", &reason) == 0;
+    if (!right || !is_line(reason, MOST_REASON)) {
+        struct http_reply r =
+            fail(400, right ? "the reason is no short line" : e.text, "the request's body",
+                 "send {\"now\": true|false, \"reason\": one line of at most 160 bytes}");
+        json_decref(body);
+        return r;
+    }
+    say_who(c, reason, by, sizeof by);
+    const int run = hub_pause(c->hub, by, now, &err);
+    json_decref(body);
+    return told(c, run, &err);
+}
+
+static struct http_reply post_ack(const struct call *c)
+{
+    json_error_t e;
+    struct gon_error err;
+    char by[300];
+    const char *note = "";
+    json_t *body = body_of(c, &e);
+    const bool right = body && json_unpack_ex(body, &e, JSON_STRICT, "{s?s}", "note", &note) == 0;
+    if (!right || !is_line(note, MOST_REASON)) {
+        struct http_reply r =
+            fail(400, right ? "the note is no short line" : e.text, "the request's body",
+                 "send {\"note\": one line of at most 160 bytes}");
+        json_decref(body);
+        return r;
+    }
+    say_who(c, note, by, sizeof by);
+    const int run = hub_ack(c->hub, by, &err);
+    json_decref(body);
     return told(c, run, &err);
 }
 
@@ -406,6 +470,7 @@ static const struct route {
     {"POST", HTTP_STOP_PATH, post_stop, "POST", false, NULL},
     {"POST", "/api/v1/pause", post_pause, "POST", true, NULL},
     {"POST", "/api/v1/resume", post_resume, "POST", true, NULL},
+    {"POST", "/api/v1/ack", post_ack, "POST", true, NULL},
 };
 
 static const char *rest_of(const struct route *r, const char *path)

@@ -12,6 +12,7 @@
 #include "daemon/engine_inside.h"
 #include "daemon/instrument.h"
 #include "daemon/instrument_devices.h"
+#include "daemon/instrument_suspend.h"
 #include "daemon/travel.h"
 
 #include <math.h>
@@ -21,7 +22,6 @@
 
 #define ATTEMPTS_MORE 3  // attempts at a point: the ranges and these
 #define MONITOR_LOST 0.5 // of the monitor after warm-up: below it the light is lost
-#define AGAIN 1          // not done, but nothing is wrong
 #define STORE_RETRY_NS CLK_S(1)
 
 const char *run_state_name(enum run_state s)
@@ -54,7 +54,7 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
                                     const char *text)
 {
     const struct plan_point *p = e->point;
-    return (struct engine_event){
+    struct engine_event event = {
         .kind = kind,
         .state = e->state,
         .sweep = p ? p->sweep : 0,
@@ -70,6 +70,8 @@ static struct engine_event event_of(const struct engine *e, enum engine_event_ki
         .wanted = e->wanted,
         .text = text,
     };
+    memcpy(event.asks, e->asks, sizeof event.asks);
+    return event;
 }
 
 void engine_say(struct engine *e, enum engine_event_kind kind, const char *level, const char *fmt,
@@ -184,16 +186,14 @@ static void publish_reading(struct engine *e, const struct acquire_reading *r,
     e->ports->publish(e->ports->ctx, &event);
 }
 
-// Means of the opening references, as far as they go.
 static void remember(struct engine *e, const struct acquire_reading *r)
 {
+    e->last_utc_ms = r->utc_ns / 1000000;
     if (e->point->kind == PLAN_DARK) {
         e->monitor_dark_v = r->monitor_v;
-        if (isnan(e->opening.dark_signal_v)) {
-            e->opening.dark_signal_v = r->signal_v;
-            e->opening.dark_monitor_v = r->monitor_v;
-        }
-    } else if (e->point->kind == PLAN_BEAM && isnan(e->opening.beam_signal_v[e->point->pol_in])) {
+        e->opening.dark_signal_v = r->signal_v;
+        e->opening.dark_monitor_v = r->monitor_v;
+    } else if (e->point->kind == PLAN_BEAM) {
         e->opening.beam_signal_v[e->point->pol_in] = r->signal_v;
         e->opening.beam_monitor_v[e->point->pol_in] = r->monitor_v;
     }
@@ -332,12 +332,14 @@ static int measure(struct engine *e, const struct travel_pose *at)
         const int sure = engine_verify(e, at, &r);
         const struct gon_error why = e->why;
         const struct store_reading row = row_of(e, &r, at);
+        if (r.accepted)
+            engine_freshen(e); // before a pause of the store, which is a gap
         rc = store(e, &row);
         if (rc < 0)
             return rc;
         if (r.accepted) {
             remember(e, &r);
-            e->done++;
+            e->done += !e->referring;
             begin_pace(e);
         }
         publish_reading(e, &r, at);
@@ -354,19 +356,30 @@ static int measure(struct engine *e, const struct travel_pose *at)
         if (r.accepted || !r.again)
             break;
         if (!e->ready) // the store paused the run: light and axes first
-            return AGAIN;
+            return ENGINE_AGAIN;
     }
     return r.accepted ? 0 : no_more_attempts(e, &r);
 }
 
-static int do_point(struct engine *e)
+int engine_do_point(struct engine *e)
 {
     struct travel_pose at;
+    e->interrupt = (struct gon_error){.code = GON_OK};
+    e->suspended = false;
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
     if (engine_pause_asked(e))
         return engine_operator_paused(e);
-    int rc = prepare(e);
+    e->heeding = true;
+    int rc = engine_suspended(e);
+    instrument_steady(e->in, false);
+    if (rc >= 0)
+        rc = engine_operator_steps(e);
+    if (rc == ENGINE_AGAIN)
+        return rc;
+    e->heeding = true; // again, after a wait for somebody
+    if (rc >= 0)
+        rc = prepare(e);
     if (rc >= 0)
         rc = instrument_watch_inputs(e->in, &e->why);
     if (rc >= 0 && !e->lit && e->point->kind != PLAN_DARK && instrument_bench(e->in)->devices_count)
@@ -385,6 +398,7 @@ static int do_point(struct engine *e)
         e->acquire.range = -1;
     if (at.still_ns > e->light_ns)
         e->light_ns = at.still_ns;
+    instrument_steady(e->in, e->lit && !e->dark);
     return measure(e, &at);
 }
 
@@ -413,11 +427,15 @@ static const struct plan_point *next_point(const struct plan *plan, const struct
 static int see_through(struct engine *e)
 {
     for (;;) {
-        int rc = do_point(e);
-        if (rc == AGAIN)
+        int rc = engine_refer(e);
+        if (rc >= 0)
+            rc = engine_do_point(e);
+        rc = engine_interrupted(e, rc);
+        e->heeding = false;
+        if (rc == ENGINE_AGAIN)
             continue;
         if (rc >= 0) {
-            e->returns = 0;
+            e->returns = e->tries = 0;
             return 0;
         }
         if (rc == GON_E_CANCELED || rc == GON_E_INPUT || rc == GON_E_SYSTEM)
@@ -437,6 +455,7 @@ static int run_points(struct engine *e)
         int rc = see_through(e);
         if (rc < 0)
             return rc;
+        engine_keep_attempt(e);
         next = next_point(e->plan, e->point);
         sweep_done(e, next);
     }
@@ -476,6 +495,7 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
         .config = config,
         .plan = plan,
         .state = RUN_QUEUED,
+        .stepped = -1,
         .acquire = {.range = -1},
         .omega_sr = bench_omega_sr(bench),
         .monitor_dark_v = (double)NAN,
@@ -487,13 +507,19 @@ enum run_state engine_run(const struct engine_ports *ports, struct instrument *i
     if (ports->opening) {
         e.opening = *ports->opening;
         e.monitor_dark_v = e.opening.dark_monitor_v;
+        e.last_utc_ms = e.opening.last_utc_ms;
     }
+    engine_begin_gap(&e);
+    engine_count_attempts(&e);
     for (int i = 0; i < plan->count; i++)
         e.done += plan->points[i].done;
     instrument_obey(instrument, ports->cancel);
     instrument_permit(instrument, false); // what the guard did before is past
+    instrument_heed(instrument, engine_heed, &e);
+    instrument_release(instrument); // whoever starts it has seen to the bench
     engine_enter(&e, RUN_PREPARING, NULL);
     const enum run_state ended = finish(&e, run_points(&e), err);
+    instrument_heed(instrument, NULL, NULL);
     instrument_obey(instrument, NULL);
     return ended;
 }

@@ -13,7 +13,11 @@
 // gone or does not answer pauses the run in a safe state (emission off where the laser can be
 // reached, axes stopped) and it goes on by itself once the device is back and identified, from the
 // point in progress; an interlock, a device's fault or a refused command pauses until somebody
-// resumes. Each reading is acknowledged by the store before the next point begins.
+// resumes. So does a
+// suspender of the bench (daemon/suspend.h), also in the middle of a point: that attempt is given
+// up, and nothing of it is stored. After a pause and when a campaign goes on, the opening
+// references are measured again before the next point on the sample (campaign/reduce.h). Each
+// reading is acknowledged by the store before the next point begins.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"
@@ -22,6 +26,7 @@
 #include "daemon/safety.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct campaign_config;
@@ -58,15 +63,23 @@ struct engine_event {
     unsigned flags;  // of the stored reading
     double left_s;   // estimate; NAN unknown
     enum safety_light light;
+    char asks[160];   // what a person has to do before it goes on; "": nothing
     bool wanted;      // ENGINE_STATE, RUN_PAUSED: by the operator; nothing is wrong
     const char *text; // ENGINE_LOG and pauses: one sentence that names the device
 };
 
-// Means of the opening reference readings, for provisional f_r after a resume, the beam's by the
+// The newest opening reference readings, for provisional f_r after a resume, the beam's by the
 // light's state; NAN: not measured yet.
 struct engine_opening {
+    int64_t last_utc_ms; // of the newest reading of all
     double dark_signal_v, dark_monitor_v;
     double beam_signal_v[POL_COUNT], beam_monitor_v[POL_COUNT];
+};
+
+// A pause as somebody asked for it.
+struct engine_asked {
+    bool now;     // the point in progress is given up; otherwise between two points
+    char by[300]; // " anna (uid 1000): lunch"; "": nobody knows
 };
 
 // While a port waits it calls instrument_breathe at least every 100 ms: the laser's lease.
@@ -85,8 +98,11 @@ struct engine_ports {
     void (*publish)(void *ctx, const struct engine_event *event);
     void (*request_fit)(void *ctx, int sweep, bool last); // does not wait
     bool (*take_resume)(void *ctx); // true once after an operator's "resume"; asked while paused
-    bool (*take_pause)(void *ctx);  // true once after an operator's "pause"; asked between readings
-                                   // and while warming up. NULL: nobody pauses
+    // True once after an operator's "pause"; asked all the time. NULL: nobody pauses.
+    bool (*take_pause)(void *ctx, struct engine_asked *ret_asked);
+    // True once after an operator's step was acknowledged, asked while one is waited for; ret_by as
+    // struct engine_asked's. NULL: nobody does.
+    bool (*take_ack)(void *ctx, char *ret_by, size_t size);
 };
 
 // Runs the plan from its first point without an accepted reading (the plan carries what is done).

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_light.c (the
-// laser's part), engine_elements.c (the elements of polarisation), engine_devices.c (shutters,
-// filter wheels and the like) and engine_verify.c (whether a reading is one) share; nobody else
-// includes it.
+// What engine.c (the run), engine_pause.c (the safe state and how it is left), engine_suspend.c
+// (suspenders and interruptions), engine_reference.c (references after a gap), engine_steps.c (what
+// a person does), engine_light.c (the laser's part), engine_elements.c (the elements of
+// polarisation), engine_devices.c (shutters, filter wheels and the like) and engine_verify.c
+// (whether a reading is one) share; nobody else includes it.
 #pragma once
 #include "daemon/acquire.h"
 #include "daemon/engine.h"
@@ -10,6 +11,11 @@
 
 struct plan_point;
 struct travel_pose;
+
+enum {
+    ENGINE_AGAIN = 1,                 // not done, but nothing is wrong
+    ENGINE_REFERENCES = 1 + POL_COUNT // dark, and the beam in each state of the light
+};
 
 struct engine {
     const struct engine_ports *ports;
@@ -25,6 +31,15 @@ struct engine {
     bool dark;   // laser off, read back at this campaign's own request; or the shutter closed that
                  // makes the darks
     bool wanted; // the pause is the operator's
+    char asks[160];           // of whoever is there; "": nothing
+    char station[BENCH_NAME]; // where the bench was made ready for; "": the sample
+    int stepped;              // the point before which a sweep's step was done; -1: none
+    bool asking;              // somebody asked for a pause, as asked says
+    struct engine_asked asked;
+    bool heeding;               // waits may be interrupted: a point is in progress
+    bool suspended;             // by a suspender, as why says
+    struct gon_error interrupt; // why a wait of this point was; code 0: none was
+    int tries;   // of a suspender that only light shows, since the last accepted reading
     int returns; // pauses that ended by themselves since the last accepted reading
     int64_t light_ns, source_ns, laser_look_ns; // light_ns: also of arrivals
     struct acquire acquire;
@@ -33,7 +48,15 @@ struct engine {
     enum instrument_part strayed; // found elsewhere after the last reading; PART_COUNT: none
 
     double omega_sr, monitor_dark_v, monitor_lit_v;
-    struct engine_opening opening;
+    struct engine_opening opening;   // the newest
+    bool gap;                        // the light was off since: they have to be measured again
+    bool referring;                  // which is being done
+    unsigned fresh;                  // opening points measured since, a bit each
+    int64_t gap_utc_ms;              // of the last reading before
+    double gap_s;                    // how long it was
+    struct engine_opening before;    // the gap
+    int attempts[ENGINE_REFERENCES]; // of the opening points
+    int64_t last_utc_ms;             // of the newest reading
     int64_t pace_ns; // when the sample's first point since the preparation was done; 0: none yet
     int pace_done;   // points done then
     struct gon_error why; // of the last failure
@@ -48,6 +71,22 @@ void engine_say(struct engine *e, enum engine_event_kind kind, const char *level
 // A state, for the file and for whoever watches; again the same without a text is no news.
 void engine_enter(struct engine *e, enum run_state state, const char *text);
 
+int engine_do_point(struct engine *e); // or ENGINE_AGAIN
+
+// --- engine_reference.c ---
+bool engine_has_beam(const struct engine *e);
+void engine_count_attempts(struct engine *e); // of the opening points, at the beginning
+void engine_keep_attempt(struct engine *e);   // of the point that is done
+void engine_begin_gap(struct engine *e);      // the light goes off, or nobody knows
+void engine_freshen(struct engine *e);        // there is a good reading of the point
+// The opening references again, where there was a gap and the sample is next; not those that were
+// measured since.
+int engine_refer(struct engine *e);
+
+// --- engine_steps.c ---
+// What a person has to do before this point, one after the other. ENGINE_AGAIN: there was a pause.
+int engine_operator_steps(struct engine *e);
+
 // --- engine_pause.c ---
 int engine_canceled(struct engine *e);                 // GON_E_CANCELED
 int engine_nap(struct engine *e, int64_t ns);          // GON_E_CANCELED
@@ -59,6 +98,15 @@ void engine_enter_pause(struct engine *e, const char *text);
 int engine_pause_run(struct engine *e);
 bool engine_pause_asked(struct engine *e);    // true once
 int engine_operator_paused(struct engine *e); // GON_E_REFUSED with its text
+int engine_wait_for_operator(struct engine *e);
+int engine_take_over(struct engine *e); // of a pause that would end by itself: the operator's now
+
+// --- engine_suspend.c ---
+int engine_suspended(struct engine *e); // looks; GON_E_REFUSED: one keeps the run
+bool engine_heed(void *ctx);            // for instrument_heed; ctx: the engine
+// What a point ended with: where that was an interruption, why; else rc.
+int engine_interrupted(struct engine *e, int rc);
+int engine_sit_out(struct engine *e); // a suspender's pause. 0: go on; GON_E_CANCELED
 
 // --- engine_elements.c ---
 // To the point's states; what stands there already is only looked at, now and then.

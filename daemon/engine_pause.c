@@ -2,12 +2,11 @@
 #include "daemon/engine_inside.h"
 
 #include "daemon/instrument_devices.h"
+#include "daemon/instrument_suspend.h"
 #include "daemon/travel.h"
 
 #include <stdio.h>
 #include <string.h>
-
-static const char by_operator[] = "by the operator; go on with: gonio resume";
 
 #define RETURNS_MOST 5 // pauses that ended by themselves, without a reading between them
 
@@ -32,7 +31,9 @@ void engine_make_safe(struct engine *e)
 {
     struct gon_error err;
     const bool was_on = instrument_light_left(e->in) == SAFETY_LIGHT_MAYBE;
-    e->ready = e->lit = e->dark = false;
+    e->ready = e->lit = e->dark = e->heeding = false;
+    engine_begin_gap(e);
+    instrument_steady(e->in, false);
     instrument_permit(e->in, false);
     if (instrument_emission_off(e->in, &err) < 0 && was_on)
         engine_say(e, ENGINE_LOG, "err", "%s", err.text);
@@ -48,13 +49,25 @@ static bool resume_asked(struct engine *e)
 
 bool engine_pause_asked(struct engine *e)
 {
-    return e->ports->take_pause && e->ports->take_pause(e->ports->ctx);
+    if (!e->asking && e->ports->take_pause)
+        e->asking = e->ports->take_pause(e->ports->ctx, &e->asked);
+    const bool was = e->asking;
+    e->asking = false;
+    return was;
 }
 
 int engine_operator_paused(struct engine *e)
 {
     e->wanted = true;
-    return gon_fail(&e->why, GON_E_REFUSED, "%s", by_operator);
+    return gon_fail(&e->why, GON_E_REFUSED, "by the operator%s; go on with: gonio resume",
+                    e->asked.by);
+}
+
+int engine_take_over(struct engine *e)
+{
+    (void)engine_operator_paused(e);
+    engine_enter_pause(e, e->why.text);
+    return engine_wait_for_operator(e);
 }
 
 static int next_lost(const struct instrument_snapshot *s, int part)
@@ -106,7 +119,7 @@ void engine_enter_pause(struct engine *e, const char *text)
     engine_enter(e, RUN_PAUSED, whole);
 }
 
-static int wait_for_operator(struct engine *e)
+int engine_wait_for_operator(struct engine *e)
 {
     int64_t tend_ns = 0;
     while (!resume_asked(e)) {
@@ -140,12 +153,10 @@ static int wait_for_devices(struct engine *e)
     char told[sizeof((struct part_state *)0)->problem] = "";
     do {
         tell_refused(e, told);
-        if (engine_pause_asked(e)) {
-            e->wanted = true;
-            engine_enter_pause(e, by_operator);
-            return wait_for_operator(e);
-        }
-        (void)resume_asked(e); // it goes on by itself anyway
+        if (engine_pause_asked(e))
+            return engine_take_over(e);
+        instrument_look_around(e->in); // a door that opens meanwhile is not forgotten
+        (void)resume_asked(e);         // it goes on by itself anyway
         if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;
     } while (instrument_reconnect(e->in) > 0);
@@ -159,12 +170,15 @@ int engine_pause_run(struct engine *e)
     char text[600];
     int rc;
     instrument_breathe(e->in);
-    (void)engine_heed_guard(e); // what it did is the reason, whatever followed from it
+    // What the guard did is the reason, whatever followed from it: somebody has to look.
+    const bool suspended = engine_heed_guard(e) == 0 && e->suspended;
     const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     engine_make_safe(e);
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
-    if (by_itself && e->returns < RETURNS_MOST) {
+    if (suspended) {
+        rc = engine_sit_out(e);
+    } else if (by_itself && e->returns < RETURNS_MOST) {
         e->returns++;
         describe_loss(e, text, sizeof text);
         engine_enter_pause(e, text);
@@ -173,13 +187,18 @@ int engine_pause_run(struct engine *e)
         snprintf(text, sizeof text, "%.440s%s", e->why.text,
                  by_itself ? "; it keeps failing: look at it, then: gonio resume" : "");
         engine_enter_pause(e, text);
-        rc = wait_for_operator(e);
+        rc = engine_wait_for_operator(e);
         e->returns = 0;
     }
-    instrument_permit(e->in, false); // what the guard did meanwhile is past
+    instrument_permit(e->in, false);               // what the guard did meanwhile is past
     const bool returned = by_itself && !e->wanted; // and nobody took the pause over
+    if (rc >= 0 && !returned && (!suspended || e->wanted))
+        instrument_release(e->in); // somebody resumed it
     e->wanted = false;
     if (rc >= 0)
-        engine_enter(e, before, returned ? "everything is there again; going on" : "resumed");
+        engine_enter(e, before,
+                     suspended  ? "nothing suspends it any more; going on"
+                     : returned ? "everything is there again; going on"
+                                : "resumed");
     return rc;
 }

@@ -32,8 +32,8 @@ struct hub {
     struct http *http;
     struct queue *queue;
     struct control control;
-    struct messenger *messenger;           // NULL: nobody is told
-    const char *notify[BENCH_NOTIFY + 1];  // its command
+    struct messenger *messenger;          // NULL: nobody is told
+    const char *notify[BENCH_NOTIFY + 1]; // its command
     struct storer *storer;
     struct runner *runner;
     struct fitter *fitter;
@@ -72,7 +72,8 @@ static void answer_stopped(struct hub *h, int status, json_t *o)
 {
     json_object_set_new(o, "put_back", h->put_back ? h->put_back : json_array());
     h->put_back = NULL;
-    json_object_set_new(o, "laser_off", json_boolean(h->snapshot && instrument_is_dark(h->snapshot)));
+    json_object_set_new(o, "laser_off",
+                        json_boolean(h->snapshot && instrument_is_dark(h->snapshot)));
     char *body = view_text(o);
     answer_stops(h, status, body);
     free(body);
@@ -102,8 +103,8 @@ static void changed(void *ctx, const struct run *run)
 {
     struct hub *h = ctx;
     const bool paused = run->state == RUN_PAUSED;
-    const bool bad = run->state == RUN_FAILED ||
-                     (paused && (!run->wanted || run->light != SAFETY_LIGHT_OFF));
+    const bool bad =
+        run->state == RUN_FAILED || (paused && (!run->wanted || run->light != SAFETY_LIGHT_OFF));
     log_say(h->options.log, bad ? LOG_WARN : LOG_NOTICE, "run", "%d %s%s%s", run->id,
             run_state_name(run->state), *run->text ? ": " : "", run->text);
     if (bad)
@@ -385,25 +386,43 @@ bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
     return room;
 }
 
-static int to_active(struct hub *h, enum note_kind kind, unsigned states, struct gon_error *err)
+// The note is given away.
+static int to_active(struct hub *h, struct note *n, unsigned states, struct gon_error *err)
 {
     const struct run *run = queue_active(h->queue);
+    int rc = GON_OK;
     if (!run)
-        return gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
-    if (!(states & 1u << run->state))
-        return gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
-                        run_state_name(run->state));
-    note_post(h->run_box, note_new(kind));
-    return run->id;
+        rc = gon_fail(err, GON_E_REFUSED, "no run is active; see: gonio list");
+    else if (!(states & 1u << run->state))
+        rc = gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
+                      run_state_name(run->state));
+    if (rc < 0)
+        note_free(n);
+    else
+        note_post(h->run_box, n);
+    return rc < 0 ? rc : run->id;
 }
 
 // One that waits for a device would go on by itself: it can be held too, once.
-int hub_pause(struct hub *h, struct gon_error *err)
+int hub_pause(struct hub *h, const char *by, bool now, struct gon_error *err)
 {
     const unsigned waits = h->held ? 0 : 1u << RUN_PAUSED;
-    int rc = to_active(h, NOTE_PAUSE, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, err);
+    struct note *n = note_new(NOTE_PAUSE);
+    n->text = note_text(by);
+    n->last = now;
+    int rc = to_active(h, n, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, err);
     h->held = h->held || rc > 0;
     return rc;
+}
+
+int hub_ack(struct hub *h, const char *by, struct gon_error *err)
+{
+    const struct run *run = queue_active(h->queue);
+    if (!run || !*run->asks)
+        return gon_fail(err, GON_E_REFUSED, "nothing waits for a person; see: gonio status");
+    struct note *n = note_new(NOTE_ACK);
+    n->text = note_text(by);
+    return to_active(h, n, 1u << RUN_PAUSED, err);
 }
 
 int hub_resume(struct hub *h, struct gon_error *err)
@@ -413,7 +432,12 @@ int hub_resume(struct hub *h, struct gon_error *err)
         queue_hold(h->queue, 0, false, NULL);
         return first.run->id;
     }
-    return to_active(h, NOTE_RESUME, 1u << RUN_PAUSED, err);
+    const struct run *run = queue_active(h->queue);
+    if (run && *run->asks)
+        return gon_fail(err, GON_E_REFUSED,
+                        "run %d waits for a person: %s; when that is done: gonio ack", run->id,
+                        run->asks);
+    return to_active(h, note_new(NOTE_RESUME), 1u << RUN_PAUSED, err);
 }
 
 // --- who commands --------------------------------------------------------------------------------
@@ -441,10 +465,9 @@ int hub_control_take(struct hub *h, const char *name, const char *reason, const 
              *before && strcmp(before, name) ? " from " : "",
              *before && strcmp(before, name) ? before : "", reason && *reason ? ": " : "",
              reason ? reason : "");
-    return control_changed(h,
-                           control_take(&h->control, name, reason, from,
-                                        clk_utc_ns(clk_system()) / 1000000, err),
-                           what);
+    return control_changed(
+        h, control_take(&h->control, name, reason, from, clk_utc_ns(clk_system()) / 1000000, err),
+        what);
 }
 
 int hub_control_release(struct hub *h, const char *name, struct gon_error *err)
@@ -662,7 +685,7 @@ static int start_workers(struct hub *h, struct gon_error *err)
                              h->options.directory, h->store_box,        h->box,
                              h->run_box,           h->options.profiles, h->options.profiles_count};
     struct fitter_links f = {h->cancel, h->fit_box, h->box, h->store_box};
-    struct runner_links r = {h->options.bench, h->options.guard, h->cancel,
+    struct runner_links r = {h->options.bench, h->options.guard, h->cancel,   h->options.directory,
                              h->run_box,       h->box,           h->store_box};
     int rc = storer_start(&s, &h->storer, err);
     rc = rc < 0 ? rc : fitter_start(&f, &h->fitter, err);
@@ -682,8 +705,8 @@ static int start_messenger(struct hub *h, struct gon_error *err)
 
 static int build(struct hub *h, int listen_fd, struct gon_error *err)
 {
-    struct queue_ports q = {h,          open_port,   start_port, fit_port,
-                            close_port, cancel_port, rearm_port, changed, keep_port};
+    struct queue_ports q = {h,           open_port,  start_port, fit_port, close_port,
+                            cancel_port, rearm_port, changed,    keep_port};
     struct http_ports p = {h, api_request};
     // Ids go on rising from one life of the daemon to the next: a thousand a second and it would be
     // late.

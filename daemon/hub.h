@@ -70,7 +70,10 @@ void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t tick
 // Stops in any case; false: 32 tickets wait for the end of a stop already, and this one will not be
 // answered.
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket);
-int hub_pause(struct hub *h, struct gon_error *err);  // the run that has the bench: its id
+// The run that has the bench: its id. by and now: as struct engine_asked.
+int hub_pause(struct hub *h, const char *by, bool now, struct gon_error *err);
+// A person's step is done; the run that waited for it. by: as of a pause.
+int hub_ack(struct hub *h, const char *by, struct gon_error *err);
 // The paused run, or when none has the bench a held queue: the id of the run that goes on.
 int hub_resume(struct hub *h, struct gon_error *err);
 

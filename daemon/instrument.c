@@ -3,6 +3,7 @@
 
 #include "campaign/bench.h"
 #include "daemon/instrument_inside.h"
+#include "daemon/instrument_suspend.h"
 #include "drivers/bus.h"
 #include "drivers/by_profile.h"
 #include "drivers/device.h"
@@ -52,11 +53,6 @@ void instrument_breathe(struct instrument *in)
     instrument_keep_relays(in);
     if (in->watcher)
         in->watcher(in->watcher_ctx);
-}
-
-int instrument_wait(struct instrument *in, int64_t until_ns, const struct cancel *cancel)
-{
-    return clk_sleep_until(&in->breathing.clk, until_ns, cancel);
 }
 
 int64_t instrument_now_ns(const struct instrument *in)
@@ -315,6 +311,8 @@ static struct instrument *make(const struct bench_config *bench, struct clk *clk
             (struct part_state){.name = "", .link = PART_LOST, .driver = "", .address = ""};
     in->talking = PART_COUNT;
     instrument_make_devices(in);
+    suspend_init(&in->suspend, bench);
+    in->looked_ns = INT64_MIN;
     in->part[PART_LASER].name = "laser";
     in->part[PART_LASER].driver = bench->laser.driver;
     in->part[PART_DETECTOR].name = "detector";
@@ -489,5 +487,7 @@ int instrument_tend(struct instrument *in)
     for (enum instrument_part part = 0; part < PART_COUNT; part++)
         if (in->part[part].link == PART_OK)
             ask(in, part);
-    return instrument_reconnect(in);
+    const int lost = instrument_reconnect(in);
+    instrument_look_around(in);
+    return lost;
 }

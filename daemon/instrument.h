@@ -21,6 +21,7 @@
 #include "base/err.h"
 #include "campaign/bench.h"
 #include "daemon/safety.h"
+#include "daemon/suspend.h"
 #include "drivers/axis.h"
 #include "drivers/detector.h"
 #include "drivers/laser.h"
@@ -103,6 +104,7 @@ struct instrument_snapshot {
     double monitor_full_scale; // in its unit; NAN: not known
     struct device_state device[BENCH_DEVICES];
     double time_constant_s; // as the device has it
+    struct suspender_state suspender[BENCH_SUSPENDERS];
 };
 
 // Objects that exist already, for tests and simulations; taken over, each may be NULL but not laser
@@ -136,6 +138,7 @@ bool instrument_is_dark(const struct instrument_snapshot *s);
 // engine waits. It must be quick and must not call back into the instrument, except
 // instrument_snapshot.
 void instrument_watch(struct instrument *in, void (*watcher)(void *ctx), void *ctx);
+// What is heeded (daemon/instrument_suspend.h) ends it with GON_E_CANCELED, too.
 int instrument_wait(struct instrument *in, int64_t until_ns, const struct cancel *cancel);
 // For waits elsewhere on the instrument thread (the store's acknowledgement): what a slice does. At
 // least every 100 ms.

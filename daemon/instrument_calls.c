@@ -285,9 +285,11 @@ int instrument_sample(struct instrument *in, struct detector_sample *ret_sample,
     int rc = instrument_sample_detector(in, err);
     if (rc >= 0 && instrument_has(in, PART_MONITOR))
         rc = instrument_sample_monitor(in, &in->sample.monitor_v, err);
-    if (rc >= 0)
-        *ret_sample = in->sample;
-    return rc;
+    if (rc < 0)
+        return rc;
+    in->sampled_steady = in->steady;
+    *ret_sample = in->sample;
+    return 0;
 }
 
 int instrument_clear(struct instrument *in, struct gon_error *err)

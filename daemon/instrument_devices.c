@@ -93,6 +93,25 @@ static int connect_selector(struct instrument *in, struct companion *c, struct p
     return rc < 0 ? rc : c->selector->ops->where(c->selector, &c->position, NULL, err);
 }
 
+// Every value that a suspender names must be one.
+static int check_values(const struct instrument *in, const struct companion *c,
+                        struct gon_error *err)
+{
+    struct inputs_value v;
+    for (int i = 0; i < in->bench->suspenders_count; i++) {
+        const struct bench_condition *when = &in->suspend.one[i].condition;
+        for (int k = 0; k < when->terms; k++) {
+            const char *name;
+            const int device = bench_term_device(in->bench, &when->term[k], &name);
+            if (device >= 0 && &in->bench->devices[device] == c->config &&
+                !inputs_find(c->inputs, name, &v))
+                return gon_fail(err, GON_E_INPUT, "has no value '%s', which suspender \"%s\" names",
+                                name, in->bench->suspenders[i].name);
+        }
+    }
+    return 0;
+}
+
 static int open_inputs(struct instrument *in, struct companion *c, const struct part_state *p,
                        struct gon_error *err)
 {
@@ -125,7 +144,8 @@ static int connect_inputs(struct instrument *in, struct companion *c, struct par
             rc = inputs_identify(c->inputs, identity, sizeof identity, err);
     }
     rc = instrument_recognise(p, rc, identity, err);
-    return rc < 0 ? rc : inputs_read(c->inputs, err);
+    rc = rc < 0 ? rc : inputs_read(c->inputs, err);
+    return rc < 0 ? rc : check_values(in, c, err);
 }
 
 int instrument_connect_device(struct instrument *in, enum instrument_part part,
@@ -237,6 +257,14 @@ int instrument_watch_inputs(struct instrument *in, struct gon_error *err)
             rc = read_inputs(in, part, err ? err : &own);
     }
     return rc;
+}
+
+void instrument_refresh_inputs(struct instrument *in)
+{
+    struct gon_error err;
+    for (enum instrument_part part = PART_DEVICES; part < PART_COUNT; part++)
+        if (in->part[part].link == PART_OK && seen(in, part)->config->use == BENCH_INPUTS)
+            read_inputs(in, part, &err);
 }
 
 bool instrument_input(const struct instrument *in, const char *name, double *ret_value)

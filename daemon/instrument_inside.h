@@ -5,6 +5,7 @@
 #pragma once
 #include "campaign/bench.h"
 #include "daemon/instrument.h"
+#include "daemon/suspend.h"
 #include "drivers/backoff.h"
 #include "drivers/guard_link.h"
 
@@ -73,6 +74,13 @@ struct instrument {
     struct detector_sample sample;
     struct monitor monitor;
     struct companion companion[BENCH_DEVICES];
+    struct suspend suspend;
+    int64_t looked_ns; // at what the suspenders want to see; INT64_MIN: never
+    bool steady, sampled_steady; // the light; and a sample was taken since
+    double (*free_mb)(void *ctx);
+    void *free_mb_ctx;
+    bool (*heed)(void *ctx);
+    void *heed_ctx;
     int talking; // the part that is being talked to, whose link nobody else may use; PART_COUNT:
                  // none
 };
@@ -108,5 +116,10 @@ const struct link_stats *instrument_device_stats(const struct instrument *in,
                                                  enum instrument_part part);
 void instrument_show_devices(const struct instrument *in, struct instrument_snapshot *s);
 void instrument_free_devices(struct instrument *in);
+void instrument_refresh_inputs(struct instrument *in); // those that are there
+
+// --- instrument_suspend.c ---
+void instrument_show_suspenders(const struct instrument *in, struct instrument_snapshot *s);
+
 // The relays of inputs are kept on, those whose link is not in use.
 void instrument_keep_relays(struct instrument *in);

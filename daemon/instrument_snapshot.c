@@ -41,6 +41,7 @@ void instrument_snapshot(const struct instrument *in, struct instrument_snapshot
     snprintf(s->detector_unit, sizeof s->detector_unit, "%s", instrument_detector_unit(in));
     instrument_show_monitor(in, s);
     instrument_show_devices(in, s);
+    instrument_show_suspenders(in, s);
     memcpy(s->part, in->part, sizeof s->part);
     for (enum instrument_part part = 0; part < PART_COUNT; part++) {
         const struct link_stats *stats = stats_of(in, part);

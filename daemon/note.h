@@ -29,7 +29,9 @@ enum note_kind {
     // to the instrument thread
     NOTE_START,   // run, thing: struct run_material
     NOTE_STORED,  // sequence, err
-    NOTE_PAUSE, NOTE_RESUME,
+    NOTE_PAUSE,   // text: by whom, last: now and not at the next point
+    NOTE_RESUME,
+    NOTE_ACK,     // text: by whom
     NOTE_HALT,    // while no run: laser off, axes stopped
     // to the fit thread
     NOTE_FIT_WANTED, // run, sweep, last, name: path

@@ -135,6 +135,8 @@ static void change(struct queue *q, struct run *run, enum run_state state, const
     if (text != run->text)
         snprintf(run->text, sizeof run->text, "%s", text ? text : "");
     if (state == RUN_DONE || state == RUN_FAILED || state == RUN_STOPPED)
+        *run->asks = 0;
+    if (state == RUN_DONE || state == RUN_FAILED || state == RUN_STOPPED)
         run->light = SAFETY_LIGHT_OFF; // no longer this run's: the devices' state tells on
     q->ports.changed(q->ports.ctx, run);
 }
@@ -355,6 +357,7 @@ void queue_engine_event(struct queue *q, int id, const struct engine_event *even
         return;
     run->light = event->light;
     run->wanted = event->wanted;
+    memcpy(run->asks, event->asks, sizeof run->asks);
     run->left_s = event->left_s;
     run->sweeps = event->sweeps;
     run->sweep = event->sweep;

@@ -30,6 +30,7 @@ struct run {
     double left_s;       // NAN unknown; of one that waits: for all of it
     bool held;           // waits until it is released
     enum safety_light light;
+    char asks[160]; // what a person has to do before it goes on; "": nothing
     bool wanted; // the pause is the operator's: nothing is wrong
     int fits_open;       // asked for and not yet stored
     bool fit_failed;     // the last one

@@ -7,14 +7,18 @@
 #include "campaign/store.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
+#include "daemon/instrument_suspend.h"
 #include "daemon/material.h"
 #include "daemon/note.h"
 #include "daemon/travel.h"
 
 #include <errno.h>
+#include <math.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 
 enum { SLICE_MS = 50, IDLE_MS = 1000 };
 #define SNAPSHOT_NS CLK_S(0.5)
@@ -31,7 +35,9 @@ struct runner {
     struct gon_error answer; // to that one
     bool reading_open;       // the last reading was posted and not yet acknowledged
     struct store_reading reading;
-    bool pause, resume, halt, quit;
+    bool pause, resume, ack, halt, quit;
+    char acked_by[300];
+    struct engine_asked asked; // of that pause
     struct note *start;       // the next run, held until the thread is idle
     int64_t next_snapshot_ns; // not before every part was asked once
     bool may_be_on;           // of the laser, at the thread's end
@@ -43,7 +49,15 @@ static void take(struct runner *r, struct note *n)
 {
     switch ((enum note_kind)n->letter.kind) {
     case NOTE_QUIT: r->quit = true; break;
-    case NOTE_PAUSE: r->pause = true; break;
+    case NOTE_PAUSE:
+        r->asked.now = (r->pause && r->asked.now) || n->last;
+        snprintf(r->asked.by, sizeof r->asked.by, "%s", n->text ? n->text : "");
+        r->pause = true;
+        break;
+    case NOTE_ACK:
+        r->ack = true;
+        snprintf(r->acked_by, sizeof r->acked_by, "%s", n->text ? n->text : "");
+        break;
     case NOTE_RESUME: r->resume = true; break;
     case NOTE_HALT: r->halt = true; break;
     case NOTE_STORED:
@@ -98,8 +112,8 @@ static int wait_stored(struct runner *r, struct gon_error *err)
         struct note *n = note_wait(r->links.box, SLICE_MS);
         if (n)
             take(r, n);
-        instrument_breathe(r->in);
-        if (cancel_requested(r->links.cancel) &&
+        const bool interrupted = instrument_interrupted(r->in);
+        if ((interrupted || cancel_requested(r->links.cancel)) &&
             end_ns > clk_now_ns(clk_system()) + STOPPED_PATIENCE_NS)
             end_ns = clk_now_ns(clk_system()) + STOPPED_PATIENCE_NS;
         if (clk_now_ns(clk_system()) > end_ns)
@@ -190,10 +204,32 @@ static bool take_resume_port(void *ctx)
     return take_flag(r, &r->resume);
 }
 
-static bool take_pause_port(void *ctx)
+static bool take_pause_port(void *ctx, struct engine_asked *ret_asked)
 {
     struct runner *r = ctx;
-    return take_flag(r, &r->pause);
+    if (!take_flag(r, &r->pause))
+        return false;
+    *ret_asked = r->asked;
+    return true;
+}
+
+static bool take_ack_port(void *ctx, char *ret_by, size_t size)
+{
+    struct runner *r = ctx;
+    if (!take_flag(r, &r->ack))
+        return false;
+    snprintf(ret_by, size, "%s", r->acked_by);
+    return true;
+}
+
+// --- the disk ------------------------------------------------------------------------------------
+
+static double free_mb(void *ctx)
+{
+    const struct runner *r = ctx;
+    struct statvfs s;
+    return statvfs(r->links.directory, &s) < 0 ? (double)NAN
+                                               : (double)s.f_bavail * (double)s.f_frsize * 1e-6;
 }
 
 // --- the thread ----------------------------------------------------------------------------------
@@ -204,7 +240,7 @@ static void run(struct runner *r)
     struct run_material *m = start->thing;
     r->start = NULL;
     r->run = start->run;
-    r->pause = r->resume = r->reading_open = false;
+    r->pause = r->resume = r->ack = r->reading_open = false;
     struct engine_ports ports = {
         .ctx = r,
         .clk = clk_system(),
@@ -216,6 +252,7 @@ static void run(struct runner *r)
         .request_fit = request_fit_port,
         .take_resume = take_resume_port,
         .take_pause = take_pause_port,
+        .take_ack = take_ack_port,
     };
     n->run = r->run;
     n->state = engine_run(&ports, r->in, &m->config, &m->plan, &n->err);
@@ -276,6 +313,7 @@ static void *thread_main(void *ctx)
     note_free(failed);
     r->next_snapshot_ns = INT64_MAX;
     instrument_watch(r->in, watch, r);
+    instrument_disk(r->in, free_mb, r);
     idle(r);
     note_free(r->start);
     r->may_be_on = !instrument_free(r->in); // laser off, axes stopped

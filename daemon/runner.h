@@ -19,6 +19,7 @@ struct runner_links {
     const struct bench_config *bench;
     const struct guard_host *guard; // of the process that holds the laser's port
     const struct cancel *cancel; // ends a run
+    const char *directory;       // of the campaigns: its disk is watched
     struct mail *box;            // the thread's own
     struct mail *to_main, *to_store;
 };

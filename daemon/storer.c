@@ -264,7 +264,7 @@ static int same_bench(const struct bench_config *then, const struct bench_config
 static int read_opening(struct store *store, struct run_material *m, struct gon_error *err)
 {
     struct store_reading *rows = NULL;
-    int count = store_read_readings(store, 0, &rows, err);
+    int count = store_read_readings(store, -1, &rows, err);
     if (count < 0)
         return count;
     struct reduce_reference r = reduce_opening(&m->plan, rows, count);
@@ -272,6 +272,9 @@ static int read_opening(struct store *store, struct run_material *m, struct gon_
                                          .dark_monitor_v = r.dark_monitor_v};
     memcpy(m->opening.beam_signal_v, r.beam_signal_v, sizeof r.beam_signal_v);
     memcpy(m->opening.beam_monitor_v, r.beam_monitor_v, sizeof r.beam_monitor_v);
+    for (int i = 0; i < count; i++)
+        if (rows[i].t_utc_ms > m->opening.last_utc_ms)
+            m->opening.last_utc_ms = rows[i].t_utc_ms;
     m->has_opening = count > 0;
     free(rows);
     return GON_OK;

@@ -21,6 +21,7 @@ json_t *view_run(const struct run *run, bool with_fit)
                           run_state_name(run->state), "text", run->text, "sweep", run->sweep,
                           "sweeps", run->sweeps, "done", run->done, "total", run->total, "emission",
                           run->light == SAFETY_LIGHT_MAYBE);
+    json_object_set_new(o, "asks", *run->asks ? json_string(run->asks) : json_null());
     json_object_set_new(o, "theta_i_deg", view_number(run->theta_i_deg));
     json_object_set_new(o, "theta_r_deg", view_number(run->theta_r_deg));
     json_object_set_new(o, "f_r_per_sr", view_number(run->f_per_sr));
@@ -180,6 +181,20 @@ json_t *view_devices(const struct instrument_snapshot *s)
                               "address", p->address, "identity", p->identity, "problem", p->problem,
                               "errors", (json_int_t)p->errors, "returns", (json_int_t)p->returns);
         json_object_update_new(o, view_part(s, i));
+        json_array_append_new(all, o);
+    }
+    return all;
+}
+
+json_t *view_suspenders(const struct instrument_snapshot *s)
+{
+    json_t *all = json_array();
+    for (int i = 0; i < BENCH_SUSPENDERS && s->suspender[i].name; i++) {
+        const struct suspender_state *one = &s->suspender[i];
+        json_t *o = json_pack("{s:s, s:s, s:b, s:b, s:b, s:s}", "name", one->name, "resume",
+                              one->manual ? "manual" : "automatic", "holds", one->holds, "keeps",
+                              one->keeps, "waits", one->waits, "text", one->text);
+        json_object_set_new(o, "left_s", view_number(one->left_s));
         json_array_append_new(all, o);
     }
     return all;

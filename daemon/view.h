@@ -10,7 +10,7 @@
 
 json_t *view_number(double value); // null unless finite
 
-// {"run", "name", "sample", "file", "state", "text", "sweep", "sweeps", "done", "total",
+// {"run", "name", "sample", "file", "state", "text", "asks", "sweep", "sweeps", "done", "total",
 //  "theta_i_deg", "theta_r_deg", "f_r_per_sr", "u_f_r_per_sr", "flags", "left_s", "emission"};
 // with_fit adds "fit".
 json_t *view_run(const struct run *run, bool with_fit);
@@ -31,6 +31,8 @@ const char *view_kind(const struct instrument_snapshot *s, int part);
 // selector "position" (null: at none) and "measures_at"; of inputs "values": [{"name", "unit",
 // "value"}]
 json_t *view_devices(const struct instrument_snapshot *s);
+// [{"name", "resume", "holds", "keeps", "waits", "left_s", "text"}], as daemon/suspend.h
+json_t *view_suspenders(const struct instrument_snapshot *s);
 json_t *view_part(const struct instrument_snapshot *s, int part); // what belongs to it alone
 
 json_t *view_flags(unsigned flags); // ["saturated", ...]

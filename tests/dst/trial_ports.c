@@ -201,11 +201,13 @@ static bool take_resume(void *ctx)
     return was;
 }
 
-static bool take_pause(void *ctx)
+static bool take_pause(void *ctx, struct engine_asked *ret_asked)
 {
     struct trial *t = ctx;
     const bool was = t->wants_pause;
     t->wants_pause = false;
+    if (was)
+        *ret_asked = (struct engine_asked){.by = ""};
     return was;
 }
 

@@ -72,6 +72,7 @@ void watch_stop(struct watch *w)
 void watch_resume(struct watch *w)
 {
     w->stop = w->running = false;
+    w->gaps++;
     w->samples = 0;
 }
 
@@ -243,6 +244,7 @@ void watch_event(struct watch *w, const struct engine_event *event)
     if (event->kind != ENGINE_STATE)
         return;
     const char *text = event->text ? event->text : "";
+    w->gaps += event->state == RUN_PAUSED;
     if (event->state == RUN_PAUSED && !*text)
         watch_violate(w, WATCH_WORDS, "paused without a reason");
     const bool known = os.now_ns > w->forced_ns + REST_NS; // not of what came by itself just now
@@ -266,7 +268,7 @@ void watch_end(struct watch *w, enum run_state ended)
     if (ended != RUN_DONE)
         return;
     for (int i = 0; i < w->plan->count; i++)
-        if (w->accepted[i] != 1)
+        if (w->accepted[i] < 1 || (w->plan->points[i].sweep > 0 && w->accepted[i] > 1))
             watch_violate(w, WATCH_ROWS, "sweep %d, point %d has %d accepted readings",
                           w->plan->points[i].sweep, w->plan->points[i].point, w->accepted[i]);
 }

@@ -12,7 +12,8 @@
 //              where the row says and where the plan wanted them; an accepted one is what the world
 //              has there, and its light was on or off as its kind wants
 //   rows       what was acknowledged is in the file at the end, as it was, and nothing else is;
-//              each point has one accepted reading when the campaign is done
+//              each point has one accepted reading when the campaign is done; an opening reference
+//              at most one more for each pause and each stop
 //   words      pauses have a reason; nobody says "laser off" while it is on; at rest the light goes
 //              off; the campaign goes on, pauses or ends
 #pragma once
@@ -70,6 +71,7 @@ struct watch {
     struct store_reading *row;
     int rows, room;
     unsigned char *accepted; // by index in the plan
+    int gaps;                // pauses, and stops that were gone on from
     // found
     int violations[WATCH_RULES], all;
     char text[WATCH_TEXT];               // the first

@@ -179,9 +179,13 @@ void watch_acknowledged(struct watch *w, const struct store_reading *row)
             abort();
     }
     w->row[w->rows++] = *row;
-    if (planned(w, row->sweep, row->point, &index) && is_accepted(row) && w->accepted[index]++)
-        watch_violate(w, WATCH_ROWS, "sweep %d, point %d was accepted twice", row->sweep,
-                      row->point);
+    if (!planned(w, row->sweep, row->point, &index) || !is_accepted(row))
+        return;
+    const int again = w->accepted[index];
+    w->accepted[index] += again < 255;
+    if (again > (row->sweep == 0 ? w->gaps : 0))
+        watch_violate(w, WATCH_ROWS, "sweep %d, point %d was accepted twice, %d gaps", row->sweep,
+                      row->point, w->gaps);
 }
 
 // --- the file ------------------------------------------------------------------------------------

@@ -23,9 +23,9 @@ def test_help_names_every_verb():
     r = gonio("help")
     assert r.returncode == 0 and r.stderr == ""
     verbs = [line.split()[0] for line in r.stdout.splitlines() if line.startswith("  ")]
-    assert verbs == ["plan", "run", "watch", "status", "devices", "stop", "laser", "pause", "resume", "queue", "control",
-                     "list", "show", "exclude", "restore", "remeasure", "verify", "backup", "fit", "model", "check",
-                     "doctor", "profile"]
+    assert verbs == ["plan", "run", "watch", "status", "devices", "stop", "laser", "pause", "resume", "ack", "queue",
+                     "control", "list", "show", "exclude", "restore", "remeasure", "verify", "backup", "fit", "model",
+                     "check", "doctor", "profile"]
     for verb in verbs:
         r = gonio("help", verb)
         assert r.returncode == 0 and f"usage: gonio {verb}" in r.stdout

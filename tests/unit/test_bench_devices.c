@@ -215,6 +215,34 @@ static void a_campaign_goes_on_with_what_makes_its_numbers(void **state)
     refused(&now, "passes 0.01, the bench's passes 0.02");
 }
 
+static void suspenders_arrive_and_their_mistakes_are_told(void **state)
+{
+    (void)state;
+#define ROOM "devices: ( { " DOOR "bus = \"axes\"; unit = 9; } ); suspenders: ( { name = \"s\"; when = "
+    struct bench_config b =
+        right(bench("monitor_aux = 1;", ROOM "\"door.t_c > 25\"; }, { name = \"a\"; when = "
+                                             "\"monitor_v < 1\"; resume = \"automatic\"; settle_s = 0.0; } );",
+                    ""));
+    assert_int_equal(b.suspenders_count, 2);
+    assert_true(b.suspenders[0].resume == BENCH_MANUAL && b.suspenders[0].settle_s == 30);
+    assert_true(b.suspenders[1].resume == BENCH_AUTOMATIC && b.suspenders[1].settle_s == 0);
+    wrong(bench("", ROOM "\"doo.open\"; } );", ""),
+          "b.cfg:8: suspenders[0].when = \"doo.open\": there is no value 'doo.open'; did you mean "
+          "'door'?; allowed DEVICE.VALUE of the devices that are inputs, interlock_open, monitor_v, "
+          "laser_power_w, disk_free_mb\n");
+    wrong(bench("", ROOM "\"monitor_v < 1\"; } );", ""),
+          "b.cfg:8: suspenders[0].when = \"monitor_v < 1\": the bench has no monitor\n");
+    wrong(bench("", ROOM "\"door.open\"; resume = \"automatic\"; } );", ""),
+          "b.cfg:8: suspenders[0].resume = \"automatic\": a door or an interlock never resumes by "
+          "itself; write \"manual\"\n");
+    wrong(bench("", ROOM "\"interlock_open\"; resume = \"automatic\"; } );", ""),
+          "b.cfg:8: suspenders[0].resume = \"automatic\": a door or an interlock never resumes by "
+          "itself; write \"manual\"\n");
+    wrong(bench("", ROOM "\"disk_free_mb <\"; } );", ""),
+          "b.cfg:8: suspenders[0].when = \"disk_free_mb <\": disk_free_mb is compared with '', which "
+          "is no number\n");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -223,6 +251,7 @@ int main(void)
         cmocka_unit_test(mistakes_of_devices_name_their_lines),
         cmocka_unit_test(mistakes_of_stations_name_their_lines),
         cmocka_unit_test(a_campaign_goes_on_with_what_makes_its_numbers),
+        cmocka_unit_test(suspenders_arrive_and_their_mistakes_are_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -233,7 +233,7 @@ static void a_station_has_its_filter_before_the_axes_come_and_until_they_left(vo
 
 static void pause_at_the_beam(struct run *r)
 {
-    if (last_is(r, 0, 2))
+    if (last_is(r, 0, 2) && r->pauses_count == 0)
         r->want_pause = true;
 }
 

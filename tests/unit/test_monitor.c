@@ -72,7 +72,7 @@ static void a_campaign_has_its_values_and_its_range_follows_the_light(void **sta
 
 static void pause_and_resume(struct run *r)
 {
-    if (!is_then(r))
+    if (!is_then(r) || r->pauses_count)
         return;
     r->want_pause = true;
     r->devices.monitor.times = 1.9; // 3.8 mW: another range, if it were chosen now
@@ -221,7 +221,7 @@ static void what_is_no_number_is_asked_again_and_never_stored(void **state)
 
 static void unplug(struct run *r)
 {
-    if (is_then(r))
+    if (is_then(r) && !r->pauses_count)
         r->b.gone_until_ns[SIMBENCH_MONITOR] = r->b.clk.t_ns + CLK_S(30);
 }
 

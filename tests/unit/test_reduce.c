@@ -146,6 +146,64 @@ static void references_are_averaged_and_their_scatter_counts(void **state)
     plan_clear(&s.plan);
 }
 
+// Dark and beam go up and down again, linearly in time; the opening references were measured again
+// at the top, as their second attempts.
+static double dark_at(double t_s)
+{
+    return 0.10 + 0.06 * (1 - fabs(t_s - 100) / 100);
+}
+
+static double beam_at(double t_s)
+{
+    return 2.0 + 0.2 * (1 - fabs(t_s - 100) / 100);
+}
+
+static struct store_reading *add_at(struct setup *s, int sweep, int point, int attempt, double t_s,
+                                    double part)
+{
+    struct store_reading *r = add(s, sweep, point, dark_at(t_s) + part * beam_at(t_s), 1);
+    r->t_utc_ms = (int64_t)(t_s * 1000);
+    r->attempt = attempt;
+    return r;
+}
+
+static void after_a_gap_references_are_taken_as_of_their_time(void **state)
+{
+    (void)state;
+    static struct setup s;
+    struct reduction r;
+    start(&s, ONE_SWEEP);
+    add_at(&s, 0, 0, 1, 0, 0)->monitor_v = 0;
+    add_at(&s, 0, 0, 2, 100, 0)->monitor_v = 0;
+    add_at(&s, 0, 1, 1, 0, 1);
+    add_at(&s, 0, 1, 2, 100, 1);
+    add_at(&s, 1, 0, 1, 30, 0.01);
+    add_at(&s, 1, 1, 1, 170, 0.01);
+    add_at(&s, 2, 0, 1, 200, 1);
+    add_at(&s, 2, 1, 1, 200, 0)->monitor_v = 0;
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(r.beams == 3 && r.darks == 3 && r.count == 2);
+    assert_true(near(r.points[0].f_per_sr, 0.01 / r.omega_sr, 1e-9));
+    assert_true(near(r.points[1].f_per_sr, 0.01 / (r.omega_sr * 0.5), 1e-9));
+    assert_true(near(r.u_dark_v, 0.03, 1e-9)); // half of what neighbours differ by
+    assert_true(near(r.u_beam_rel, 0.1 / ((2.0 + 2.2 + 2.0) / 3), 1e-9));
+    reduction_clear(&r);
+
+    s.rows[1].flags = s.rows[3].flags = STORE_DISCARDED; // then it is a mean again
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, NULL), 0);
+    assert_true(r.beams == 2 && r.darks == 2);
+    assert_true(near(r.points[0].f_per_sr, (dark_at(30) - 0.1 + 0.01 * beam_at(30)) / 2 / r.omega_sr,
+                     1e-9));
+    reduction_clear(&r);
+
+    s.rows[1].flags = s.rows[3].flags = 0;
+    s.rows[3].signal_v = 0.1; // one of them without light
+    struct gon_error err;
+    assert_int_equal(reduce_run(&s.bench, &s.plan, s.rows, s.count, &r, &err), GON_E_INPUT);
+    assert_non_null(strstr(err.text, "is not above the dark"));
+    plan_clear(&s.plan);
+}
+
 static void only_accepted_readings_are_reduced(void **state)
 {
     (void)state;
@@ -469,6 +527,7 @@ int main(void)
         cmocka_unit_test(overfilled_divides_by_the_other_cosine),
         cmocka_unit_test(angles_are_the_encoders),
         cmocka_unit_test(references_are_averaged_and_their_scatter_counts),
+        cmocka_unit_test(after_a_gap_references_are_taken_as_of_their_time),
         cmocka_unit_test(only_accepted_readings_are_reduced),
         cmocka_unit_test(a_filter_that_stands_in_the_beam_alone_divides_the_beam),
         cmocka_unit_test(each_state_is_divided_by_its_own_beam),

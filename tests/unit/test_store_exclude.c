@@ -17,6 +17,7 @@ static void measure(struct store *s, const struct plan_point *p, int attempt, do
     struct store_reading r = reading(p->sweep, p->point, attempt);
     r.monitor_v = p->kind == PLAN_DARK ? 0 : 1;
     r.signal_v = signal_v;
+    r.t_utc_ms = 1700000000000 + number("SELECT count(*) FROM reading") * 1000;
     r.theta_i_udeg = (int32_t)(1e6 * p->theta_i_deg);
     r.theta_r_udeg = (int32_t)(1e6 * p->theta_r_deg);
     append(s, &r);
@@ -309,6 +310,7 @@ static void a_sweep_is_measured_again_with_its_references(void **state)
     char text[16];
     struct store_progress p = progress(s);
     const int total = p.total;
+    struct reduction before = reduced(s);
     const int64_t sweep_2 = number("SELECT count(*) FROM plan WHERE sweep = 2");
     const int all = store_remeasure(s, 2, &dust, &err);
     assert_int_equal(all, sweep_2);
@@ -330,6 +332,10 @@ static void a_sweep_is_measured_again_with_its_references(void **state)
     assert_true(p.done == total && p.again == 0 && p.readings == total + sweep_2 + 4);
     r = reduced(s);
     assert_true(r.beams == 4 && r.darks == 4);
+    assert_int_equal(r.count, before.count);
+    for (int i = 0; i < r.count; i++) // each with the beam of its own day
+        assert_true(fabs(r.points[i].f_per_sr / before.points[i].f_per_sr - 1) < 1e-12);
+    reduction_clear(&before);
     assert_int_equal(r.count, number("SELECT count(*) FROM plan WHERE kind = 'sample'"));
     assert_true(fabs(r.reference.beam_signal_v[POL_U] - 2.02) < 1e-12);
     assert_true(fabs(r.u_beam_rel - 0.01 / 1.01) < 1e-6); // half of the 2 %, not a half of that

@@ -240,6 +240,7 @@ static void a_campaign_goes_on_where_it_was_stopped(void **state)
     assert_true(m->has_opening);
     assert_true(fabs(m->opening.beam_signal_v[POL_U] - 0.800001) < 1e-9);
     assert_true(fabs(m->opening.dark_monitor_v - 0.002) < 1e-9);
+    assert_int_equal(m->opening.last_utc_ms, 1800000000000);
     run_material_free(m);
     close_run(w, run->id, RUN_STOPPED);
     free(run);
