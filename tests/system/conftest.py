@@ -276,8 +276,12 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None, **kwargs):
                           env={**os.environ, "NO_COLOR": "", **(env or {})}, **kwargs)
 
 
-LONGEST = ["test_guard", "test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_replug",
+LONGEST = ["test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_replug",
            "test_safety", "test_daemon"]
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "timed: measures how long something takes; scripts/system runs it in quiet")
 
 
 def pytest_collection_modifyitems(items):

@@ -5,7 +5,7 @@ How late OFF comes is the time from the signal to the first OFF on the wire, by 
 (CLOCK_MONOTONIC, as ours). A machine that is busy is late itself: a second thread measures that meanwhile, as the most
 that a sleep of 1 ms took too long. The guard, the pty's worker and the simulator wake up once each on that way, so that
 three times as much and 10 ms are allowed on top, at most 1 s. The bounds are those of the design, 50 ms after a death and 550 ms after a hang, for every
-single one. GONIO_GUARD_DEATHS says how often goniod dies each way: 20, and 250 (1,000 in all) for the long run."""
+single one. GONIO_GUARD_DEATHS says how often goniod dies each way: 5, in CI 20 once, and 250 (1,000 in all) for the long run."""
 import ctypes
 import json
 import os
@@ -19,6 +19,8 @@ import pytest
 
 from conftest import BUILD, gonio, wait_for
 
+pytestmark = pytest.mark.timed
+
 PLAN = """\
 campaign: {
   name = "guarded";
@@ -29,7 +31,7 @@ campaign: {
 };
 """
 OFF = ("l0", "@cob0")
-DEATHS = int(os.environ.get("GONIO_GUARD_DEATHS", "20"))
+DEATHS = int(os.environ.get("GONIO_GUARD_DEATHS", "5"))
 SEED = int(os.environ.get("GONIO_TEST_SEED", "20261126"))
 # AddressSanitizer wants to be the first library of all; here it need not.
 MISHAP = {"LD_PRELOAD": str(BUILD / "tests" / "libmishap.so"),
