@@ -13,11 +13,10 @@
 // gone or does not answer pauses the run in a safe state (emission off where the laser can be
 // reached, axes stopped) and it goes on by itself once the device is back and identified, from the
 // point in progress; an interlock, a device's fault or a refused command pauses until somebody
-// resumes. So does a
-// suspender of the bench (daemon/suspend.h), also in the middle of a point: that attempt is given
-// up, and nothing of it is stored. After a pause and when a campaign goes on, the opening
-// references are measured again before the next point on the sample (campaign/reduce.h). Each
-// reading is acknowledged by the store before the next point begins.
+// resumes. So does a suspender of the bench (daemon/suspend.h), also in the middle of a point: that
+// attempt is given up, and nothing of it is stored. After a pause and when a campaign goes on, the
+// opening references are measured again before the next point on the sample (campaign/reduce.h),
+// unless they were since. Each reading is acknowledged by the store before the next point begins.
 #pragma once
 #include "base/cancel.h"
 #include "base/clk.h"

@@ -238,22 +238,32 @@ def test_excluded_while_it_is_measured(start_daemon):
 # --- measured again -------------------------------------------------------------------------------
 
 
+def good(file, sweep):
+    """How many good readings its points have, by point; that is not the number of attempts."""
+    return dict(query(file, f"select point, count(*) from reading where sweep = {sweep}"
+                            " and (flags & 255) = 0 group by point"))
+
+
 def accepted(file, sweep):
-    """How many good readings its points have, as a set; that is not the number of attempts."""
-    return {n for _, n in query(file, f"select point, count(*) from reading where sweep = {sweep}"
-                                      " and (flags & 255) = 0 group by point")}
+    return set(good(file, sweep).values())
 
 
-def check_measured_again(file, sweep, last=4):
-    """A second good reading of every point of the sweep, bracketed by new references, and of nothing else."""
-    assert accepted(file, sweep) == {2} and accepted(file, 0) == {2}
+def check_measured_again(file, sweep, last=4, opening=None):
+    """A second good reading of every point of the sweep, bracketed by new references, and of nothing else.
+
+    opening: how many good readings the opening references have, where the laser was off meanwhile.
+    """
+    assert accepted(file, sweep) == {2}
+    assert good(file, 0) == opening if opening else accepted(file, 0) == {2}
     assert min(accepted(file, last)) == 2 or query(file, "select count(*) from exclusion where sweep = 4") == [(0,)]
     assert all(accepted(file, s) == {1} for s in range(1, last) if s != sweep)
 
     def time(what, s):
         return query(file, f"select {what}(t) from (select max(t_utc_ms) t from reading where sweep = {s}"
                            " and (flags & 255) = 0 group by point)")[0][0]
-    assert time("max", 0) <= time("min", sweep) and time("max", sweep) <= time("min", last)
+    (opened,), = query(file, "select max(t_utc_ms) from (select t_utc_ms, row_number() over (partition by point"
+                             " order by attempt) n from reading where sweep = 0 and (flags & 255) = 0) where n = 2")
+    assert opened <= time("min", sweep) and time("max", sweep) <= time("min", last)
     newest = "reduction = (select max(id) from reduction)"
     assert query(file, f"select point, attempt from reduced where sweep = {sweep} and {newest} order by point") == query(
         file, f"select point, max(attempt) from reading where sweep = {sweep} and (flags & 255) = 0 group by point")
@@ -358,10 +368,11 @@ def test_killed_in_between(start_daemon, start_sim, tmp_path, after):
     (entry,) = json.loads(gonio("list", "--json", "--dir", d.directory).stdout)
     assert entry["state"] in ("stopped", "interrupted") and entry["done"] < entry["total"]
     whole(file)
+    opening = {point: n + 1 for point, n in good(file, 0).items()}  # once each, whatever was done before
     d = start_daemon(*bench, folder=tmp_path / "d")
     r = d.gonio("resume", run)
     assert r.returncode == 0, r.stderr
-    check_measured_again(file, 2)
+    check_measured_again(file, 2, opening=opening)
 
 
 def test_remeasure_needs_the_daemon_and_its_folder(copy, daemon):

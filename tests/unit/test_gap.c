@@ -123,6 +123,28 @@ static void dark_and_beam_are_measured_again_before_the_sample(void **state)
     end(r);
 }
 
+// The disk is full once, after the dark of the gap.
+static void fail_then(struct run *r)
+{
+    pause_then(r);
+    if (r->rows > pause_row && is_accepted(&r->row[r->rows - 1]) && r->pauses_count == 1)
+        r->store_fails = 3;
+}
+
+static void a_gap_in_the_references_makes_them_old_again(void **state)
+{
+    (void)state;
+    struct run *r = begin_paused(opening_rows() + 4);
+    r->on_row = fail_then;
+    assert_int_equal(go(r), RUN_DONE);
+    assert_complete(r);
+    assert_int_equal(r->pauses_count, 2);
+    assert_int_equal(rows_of(r, PLAN_DARK, 0), 3);
+    assert_true(rows_of(r, PLAN_BEAM, 0) >= 2);
+    assert_int_equal(said_count, 1);
+    end(r);
+}
+
 static void pause_at_the_end(struct run *r)
 {
     pause_row = r->row[r->rows - 1].sweep == 3 ? r->rows : 0; // only references are left
@@ -216,6 +238,7 @@ static void references_that_are_open_anyway_are_measured_once(void **state)
     assert_int_equal(rows_of(r, PLAN_DARK, 0), 2);
     assert_int_equal(rows_of(r, PLAN_BEAM, 0), 2);
     assert_int_equal(r->row[before].sweep, 0);
+    assert_int_equal(said_count, 0);
     assert_int_equal(r->violations, 0);
     end(r);
 }
@@ -269,6 +292,7 @@ int main(void)
         cmocka_unit_test(dark_and_beam_are_measured_again_before_the_sample),
         cmocka_unit_test(nothing_is_measured_again_without_need),
         cmocka_unit_test(a_campaign_that_goes_on_another_day_has_them_again),
+        cmocka_unit_test(a_gap_in_the_references_makes_them_old_again),
         cmocka_unit_test(references_that_are_open_anyway_are_measured_once),
         cmocka_unit_test(readings_are_reduced_with_the_references_around_them),
     };
