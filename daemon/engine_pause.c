@@ -142,6 +142,7 @@ static int wait_for_devices(struct engine *e)
         tell_refused(e, told);
         if (engine_pause_asked(e)) {
             e->wanted = true;
+            arm_end(instrument_arm(e->in), "the run was paused");
             engine_enter_pause(e, by_operator);
             return wait_for_operator(e);
         }
@@ -162,6 +163,8 @@ int engine_pause_run(struct engine *e)
     (void)engine_heed_guard(e); // what it did is the reason, whatever followed from it
     const bool by_itself = e->why.code == GON_E_LINK || e->why.code == GON_E_GONE;
     engine_make_safe(e);
+    if (!by_itself || e->returns >= RETURNS_MOST)
+        arm_end(instrument_arm(e->in), "the run was paused");
     if (cancel_requested(e->ports->cancel))
         return engine_canceled(e);
     if (by_itself && e->returns < RETURNS_MOST) {

@@ -5,6 +5,7 @@
 #include "base/clk.h"
 #include "base/log.h"
 #include "campaign/store.h"
+#include "daemon/arm.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
 #include "daemon/material.h"
@@ -32,10 +33,41 @@ struct runner {
     bool reading_open;       // the last reading was posted and not yet acknowledged
     struct store_reading reading;
     bool pause, resume, halt, quit;
+    uint64_t arm_changes;     // of the arm, as told
     struct note *start;       // the next run, held until the thread is idle
     int64_t next_snapshot_ns; // not before every part was asked once
     bool may_be_on;           // of the laser, at the thread's end
 };
+
+// --- the arm -------------------------------------------------------------------------------------
+
+static void tell_arm(struct runner *r, uint64_t ticket, const struct gon_error *err)
+{
+    struct note *n = note_new(NOTE_ARMED);
+    struct arm *copy = malloc(sizeof *copy);
+    if (copy)
+        *copy = *instrument_arm(r->in);
+    n->ticket = ticket;
+    n->thing = copy;
+    if (err)
+        n->err = *err;
+    note_post(r->links.to_main, n);
+}
+
+static void change_arm(struct runner *r, const struct note *n)
+{
+    struct arm *arm = instrument_arm(r->in);
+    const int64_t now_ns = instrument_now_ns(r->in), utc_ms = instrument_utc_ns(r->in) / 1000000;
+    struct gon_error err = {0};
+    if (n->letter.kind == NOTE_ARM)
+        arm_set(arm, n->name, n->text, n->for_s, now_ns, utc_ms, &err);
+    else if (n->letter.kind == NOTE_EXTEND)
+        arm_extend(arm, n->name, n->text, n->for_s, now_ns, utc_ms, &err);
+    else
+        arm_end(arm, n->text);
+    if (n->ticket)
+        tell_arm(r, n->ticket, &err);
+}
 
 // --- what the others say -------------------------------------------------------------------------
 
@@ -50,6 +82,9 @@ static void take(struct runner *r, struct note *n)
         r->acknowledged = n->sequence;
         r->answer = n->err;
         break;
+    case NOTE_ARM:
+    case NOTE_EXTEND:
+    case NOTE_DISARM: change_arm(r, n); break;
     case NOTE_START: r->start = n; return;
     default: break;
     }
@@ -72,12 +107,42 @@ static void send_snapshot(struct runner *r)
     note_post(r->links.to_main, n);
 }
 
+// Events are committed in order with the readings; nobody waits for them.
+static int store_event_port(void *ctx, const char *level, const char *source, const char *text,
+                            struct gon_error *err)
+{
+    struct runner *r = ctx;
+    struct note *n = note_new(NOTE_EVENT);
+    (void)err;
+    n->run = r->run;
+    n->level = level;
+    n->source = source;
+    n->text = note_text(text);
+    note_post(r->links.to_store, n);
+    return GON_OK;
+}
+
+// In the file too, while a run has the bench.
+static void watch_arm(struct runner *r)
+{
+    const struct arm *arm = instrument_arm(r->in);
+    char text[ARM_NAME + ARM_END + ARM_REASON + 40];
+    if (arm->changes == r->arm_changes)
+        return;
+    r->arm_changes = arm->changes;
+    tell_arm(r, 0, NULL);
+    arm_describe(arm, text, sizeof text);
+    if (r->run)
+        store_event_port(r, "notice", "laser", text, NULL);
+}
+
 // Between the slices of every wait.
 static void watch(void *ctx)
 {
     struct runner *r = ctx;
     int64_t now_ns = clk_now_ns(clk_system());
     take_all(r);
+    watch_arm(r);
     if (now_ns < r->next_snapshot_ns)
         return;
     r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
@@ -134,21 +199,6 @@ static int store_reading_port(void *ctx, const struct store_reading *reading, st
     if (r->acknowledged == r->sequence)
         r->reading_open = false;
     return rc;
-}
-
-// Events are committed in order with the readings; nobody waits for them.
-static int store_event_port(void *ctx, const char *level, const char *source, const char *text,
-                            struct gon_error *err)
-{
-    struct runner *r = ctx;
-    struct note *n = note_new(NOTE_EVENT);
-    (void)err;
-    n->run = r->run;
-    n->level = level;
-    n->source = source;
-    n->text = note_text(text);
-    note_post(r->links.to_store, n);
-    return GON_OK;
 }
 
 static void publish_port(void *ctx, const struct engine_event *event)
@@ -217,6 +267,8 @@ static void run(struct runner *r)
         .take_resume = take_resume_port,
         .take_pause = take_pause_port,
     };
+    r->arm_changes = 0; // who armed it before belongs into this file as well
+    watch_arm(r);
     n->run = r->run;
     n->state = engine_run(&ports, r->in, &m->config, &m->plan, &n->err);
     r->run = 0;

@@ -184,6 +184,7 @@ static void answer_known(struct storer *s, const struct note *question, enum not
 {
     struct note *n = note_new(kind);
     n->ticket = question->ticket;
+    n->by = note_text(question->by);
     n->run = question->run;
     n->text = complaints;
     n->thing = entry ? run_of(s, entry) : NULL;
