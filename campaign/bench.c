@@ -112,6 +112,8 @@ static const struct cfg_row laser_rows[] = {
            "gonio laser arm."),
     REAL(bench_config, "arm_h", laser.arm_h, "h", 0.0003, 168, "12",
          "For how long, where the command does not say it."),
+    REAL(bench_config, "align_power_w", laser.align_power_w, "W", 0, 100, "0",
+         "The most of gonio laser align; 0: not allowed."),
     CHOICE(
         bench_config, "polarisation", laser.polarisation, polarisation_names, NULL,
         "Of the light on the sample; \"unknown\" is an answer, and a warning with every result."),

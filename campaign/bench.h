@@ -69,6 +69,7 @@ struct bench_laser {
     double warmup_s;
     int arm;      // enum bench_arm: whether commands that start light arm the laser
     double arm_h; // for how long, if nobody says
+    double align_power_w; // the most of an alignment session; 0: there is none
     int polarisation; // enum polarisation; POL_UNKNOWN is an answer, no answer is a mistake
 };
 

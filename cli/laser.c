@@ -24,6 +24,7 @@
 
 struct options {
     const char *socket, *bench, *link, *driver, *time, *reason;
+    double power_w;
     bool json;
 };
 
@@ -36,7 +37,9 @@ static const struct option_row rows[] = {
      "or the laser's link, and"},
     {"--driver", OPTION_TEXT, offsetof(struct options, driver), "NAME", 0, 0, "its profile"},
     {"--for", OPTION_TEXT, offsetof(struct options, time), "TIME", 0, 0,
-     "arm: until then, 8h, 90min, 30s; otherwise as the bench file says"},
+     "arm, align: so long, 8h, 90min, 30s; arm otherwise as the bench file says"},
+    {"--power", OPTION_REAL, offsetof(struct options, power_w), "W", 0, 100,
+     "align: the set-point, at most laser.align_power_w"},
     {"--reason", OPTION_TEXT, offsetof(struct options, reason), "TEXT", 0, 0,
      "arm: what for, for the others"},
     {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
@@ -202,8 +205,8 @@ static int run_laser(const struct verb *verb, int argc, char **argv)
     if (verb_take(verb, argc, argv, &o, &what, 0, 1) < 0)
         return EXIT_INPUT;
     const bool off_asked = what && !strcmp(what, "off");
-    if (off_asked && (o.time || o.reason)) {
-        out_say("laser off: --for and --reason are for laser arm");
+    if (off_asked && (o.time || o.reason || o.power_w > 0)) {
+        out_say("laser off: --for, --reason and --power are for arm and align");
         return EXIT_INPUT;
     }
     if (!off_asked && (o.bench || o.link || o.driver)) {
@@ -211,7 +214,8 @@ static int run_laser(const struct verb *verb, int argc, char **argv)
         return EXIT_INPUT;
     }
     if (!off_asked)
-        return laser_ask(&(struct remote_options){o.socket, o.json}, what, o.time, o.reason);
+        return laser_ask(&(struct remote_options){o.socket, o.json}, what, o.time, o.reason,
+                         o.power_w);
     if (!o.link != !o.driver || (o.link && o.bench)) {
         out_say("laser off: --link and --driver belong together, and --bench gives both");
         return EXIT_INPUT;
@@ -221,12 +225,14 @@ static int run_laser(const struct verb *verb, int argc, char **argv)
 
 const struct verb verb_laser = {
     "laser",
-    "[arm | disarm | off]",
+    "[arm | disarm | align | off]",
     "arm the laser, disarm it, switch it off",
     "Without a word: whether the laser is armed, by whom and until when, and whether light comes "
     "out. arm allows runs to switch it on, in the name in GONIO_NAME or your login; it switches "
     "nothing on. It ends at its time, with disarm, with an operator's pause or one that waits for a "
     "person, with a stop and with goniod; emission that is on then goes off and the run pauses.\n"
+    "align switches it on at a low power while no run has the bench, where the bench file allows it "
+    "(laser.align_power_w), for 30 min at most; laser off, disarm and stop end it.\n"
     "off switches the laser off through its guard, the process that holds its port and lives on when "
     "goniod hangs or dies, and says so when the laser confirmed it; a run pauses then, and goes on "
     "after gonio resume. Where no guard is (goniod does not run), --bench FILE, or --link and "

@@ -30,16 +30,16 @@ int laser_time(const char *text, double *ret_s)
 }
 
 // NULL after saying what is wrong.
-static json_t *request(const char *what, const char *time, const char *reason)
+static json_t *request(const char *what, const char *time, const char *reason, double power_w)
 {
     double for_s = 0;
-    const bool arm = !strcmp(what, "arm");
-    if (!arm && strcmp(what, "disarm")) {
-        out_say("laser '%s': arm, disarm or off; a run switches it on: gonio run FILE.cfg", what);
+    const bool arm = !strcmp(what, "arm"), align = !strcmp(what, "align");
+    if (!arm && !align && strcmp(what, "disarm")) {
+        out_say("laser '%s': arm, disarm, align or off; a run switches it on: gonio run FILE.cfg", what);
         return NULL;
     }
-    if (!arm && (time || reason)) {
-        out_say("--for and --reason are for laser arm");
+    if (align ? !time || reason || !(power_w > 0) : power_w > 0 || (!arm && (time || reason))) {
+        out_say("--for and --reason are for laser arm; align wants --power W and --for TIME");
         return NULL;
     }
     if (time && (laser_time(time, &for_s) < 0 || !(for_s > 0))) {
@@ -47,6 +47,8 @@ static json_t *request(const char *what, const char *time, const char *reason)
         return NULL;
     }
     json_t *body = json_pack("{s:s}", "do", what);
+    if (align)
+        json_object_set_new(body, "power_w", json_real(power_w));
     if (time)
         json_object_set_new(body, "for_s", json_real(for_s));
     if (reason)
@@ -60,17 +62,18 @@ static int show(const struct remote_options *remote, json_t *reply)
     if (remote->json)
         out_json(reply);
     else
-        printf("%s\nlight: %s\n", json_string_value(json_object_get(reply, "text")), light);
+        printf("%s\nlight: %s%s\n", json_string_value(json_object_get(reply, "text")), light,
+               json_is_object(json_object_get(reply, "align")) ? ", alignment" : "");
     json_decref(reply);
     return out_finish(EXIT_OK);
 }
 
 int laser_ask(const struct remote_options *remote, const char *what, const char *time,
-              const char *reason)
+              const char *reason, double power_w)
 {
     int status = EXIT_OK;
-    json_t *body = what ? request(what, time, reason) : NULL;
-    if (what ? !body : (time || reason) != 0) {
+    json_t *body = what ? request(what, time, reason, power_w) : NULL;
+    if (what ? !body : (time || reason || power_w > 0)) {
         if (!what)
             out_say("--for and --reason are for laser arm");
         return EXIT_INPUT;

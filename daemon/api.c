@@ -318,17 +318,30 @@ static struct http_reply get_laser(const struct call *c)
     return reply(200, view_text(view_laser(hub_arming(c->hub), s.snapshot)));
 }
 
+static int align(const struct call *c, double power_w, double for_s, struct gon_error *err)
+{
+    const struct run *active = queue_active(hub_queue(c->hub));
+    if (active)
+        return gon_fail(err, GON_E_REFUSED, "run %d has the bench; end it: gonio stop", active->id);
+    if (!*c->request->name)
+        return gon_fail(err, GON_E_INPUT, "alignment needs a name; set GONIO_NAME");
+    arming_align(hub_arming(c->hub), c->request->name, power_w, for_s, c->ticket);
+    return GON_OK;
+}
+
 static int change_arm(const struct call *c, const char *what, const char *reason, double for_s,
-                      struct gon_error *err)
+                      double power_w, struct gon_error *err)
 {
     char text[40], why[120];
+    if (!strcmp(what, "align"))
+        return align(c, power_w, for_s, err);
     if (!strcmp(what, "arm") && for_s >= 0)
         arming_arm(hub_arming(c->hub), c->request->name, reason, for_s, c->ticket);
     else if (!strcmp(what, "disarm")) {
         snprintf(why, sizeof why, "disarmed by %s", caller(c, text));
         arming_disarm(hub_arming(c->hub), why, c->ticket);
     } else
-        return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\", for %g s; use arm or disarm", what,
+        return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\", for %g s; use arm, disarm or align", what,
                         for_s);
     return GON_OK;
 }
@@ -339,18 +352,19 @@ static struct http_reply post_laser(const struct call *c)
     json_error_t e;
     struct gon_error err;
     const char *what, *reason = NULL;
-    double for_s = 0;
+    double for_s = 0, power_w = 0;
     json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
-    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s, s?F}", "do", &what, "reason",
-                                &reason, "for_s", &for_s) < 0) {
+    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s, s?F, s?F}", "do", &what,
+                                "reason", &reason, "for_s", &for_s, "power_w", &power_w) < 0) {
         json_decref(body);
         return fail(400, e.text, "the request's body",
-                    "send {\"do\": \"arm\"|\"disarm\", \"reason\": text, \"for_s\": seconds}");
+                    "send {\"do\": \"arm\"|\"disarm\"|\"align\", \"reason\": text, \"for_s\": seconds, "
+                    "\"power_w\": watts}");
     }
     int rc = strcmp(what, "disarm")
                  ? control_check(hub_control(c->hub), c->request->name, &err)
                  : GON_OK;
-    rc = rc < 0 ? rc : change_arm(c, what, reason, for_s, &err);
+    rc = rc < 0 ? rc : change_arm(c, what, reason, for_s, power_w, &err);
     json_decref(body);
     return rc < 0 ? failed(&err) : reply(HTTP_LATER, NULL);
 }

@@ -12,9 +12,12 @@ static double bench_s(const struct arming *a)
 
 int arming_may_start(const struct arming *a, struct gon_error *err)
 {
+    struct gon_error why;
+    if (a->align.running)
+        return gon_fail(err, GON_E_REFUSED, "%s aligns the laser; end it: gonio laser off",
+                        a->align.name);
     if (a->rule->arm == BENCH_ARM_RUN)
         return 0;
-    struct gon_error why;
     if (arm_check(&a->seen, clk_now_ns(clk_system()), &why) == 0)
         return 0;
     return gon_fail(err, GON_E_REFUSED, "the laser is %.400s", why.text);
@@ -48,9 +51,29 @@ void arming_disarm(struct arming *a, const char *why, uint64_t ticket)
     send(a, NOTE_DISARM, NULL, why, 0, ticket);
 }
 
+void arming_align(struct arming *a, const char *by, double power_w, double for_s, uint64_t ticket)
+{
+    struct note *n = note_new(NOTE_ALIGN);
+    n->ticket = ticket;
+    n->name = note_text(by);
+    n->power_w = power_w;
+    n->for_s = for_s;
+    note_post(a->to_runner, n);
+}
+
+static bool align_told(struct arming *a, const struct align *align)
+{
+    const bool news = align && align->changes != a->align.changes;
+    if (news)
+        a->align = *align;
+    return news;
+}
+
 bool arming_told(struct arming *a, const struct note *n)
 {
     const struct arm *arm = n->thing;
+    if (n->letter.kind == NOTE_ALIGNED)
+        return align_told(a, n->thing);
     const bool news = arm && arm->changes != a->seen.changes;
     if (news)
         a->seen = *arm;

@@ -514,7 +514,12 @@ static void armed(struct hub *h, const struct note *n)
 {
     if (arming_told(&h->arming, n)) {
         char text[400];
+        const struct align *a = &h->arming.align;
         arm_describe(&h->arming.seen, text, sizeof text);
+        if (n->letter.kind == NOTE_ALIGNED && a->running)
+            snprintf(text, sizeof text, "%s aligns at %g W", a->name, a->power_w);
+        else if (n->letter.kind == NOTE_ALIGNED)
+            snprintf(text, sizeof text, "the alignment of %s ended: %s", a->name, a->end);
         log_say(h->options.log, LOG_NOTICE, "laser", "%s", text);
         publish(h, "laser", view_laser(&h->arming, h->snapshot));
     }
@@ -587,7 +592,8 @@ static void take(struct hub *h, struct note *n)
     case NOTE_ENDED: engine_ended(h, n); break;
     case NOTE_SNAPSHOT: take_snapshot(h, n); break;
     case NOTE_HALTED: halted(h, n); break;
-    case NOTE_ARMED: armed(h, n); break;
+    case NOTE_ARMED:
+    case NOTE_ALIGNED: armed(h, n); break;
     default: break;
     }
 }

@@ -32,6 +32,7 @@ enum note_kind {
     NOTE_ARM,     // ticket (0: none), name: whose, text: reason, for_s: arm the laser
     NOTE_EXTEND,  // the same, unless it is armed for longer
     NOTE_DISARM,  // ticket, text: why
+    NOTE_ALIGN,   // ticket, name: whose, power_w, for_s: an alignment session
     // to the fit thread
     NOTE_FIT_WANTED, // run, sweep, last, name: path
     // to the main thread
@@ -48,7 +49,8 @@ enum note_kind {
     NOTE_ENDED,    // run, state, err
     NOTE_SNAPSHOT, // thing: struct instrument_snapshot
     NOTE_HALTED,   // err
-    NOTE_ARMED     // ticket (0: none), thing: struct arm as it is now, err: why it is not as asked
+    NOTE_ARMED,    // ticket (0: none), thing: struct arm as it is now, err: why it is not as asked
+    NOTE_ALIGNED   // ticket (0: none), thing: struct align as it is now, err: likewise
 };
 
 struct note {
@@ -60,7 +62,7 @@ struct note {
     struct gon_error err; // code 0: none
     struct engine_event event; // its text is the note's
     const char *level, *source; // static texts
-    double for_s;
+    double for_s, power_w;
     char *text, *name, *by; // by: whose command
     void *thing;
     void (*drop)(void *thing); // how to free the thing; NULL: free

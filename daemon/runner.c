@@ -5,6 +5,7 @@
 #include "base/clk.h"
 #include "base/log.h"
 #include "campaign/store.h"
+#include "daemon/align.h"
 #include "daemon/arm.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
@@ -34,6 +35,9 @@ struct runner {
     struct store_reading reading;
     bool pause, resume, halt, quit;
     uint64_t arm_changes;     // of the arm, as told
+    struct align align;
+    uint64_t align_changes;   // of it, as told
+    struct note *align_asked; // held until the thread is idle
     struct note *start;       // the next run, held until the thread is idle
     int64_t next_snapshot_ns; // not before every part was asked once
     bool may_be_on;           // of the laser, at the thread's end
@@ -69,6 +73,32 @@ static void change_arm(struct runner *r, const struct note *n)
         tell_arm(r, n->ticket, &err);
 }
 
+static void tell_align(struct runner *r, uint64_t ticket, const struct gon_error *err)
+{
+    struct note *n = note_new(NOTE_ALIGNED);
+    struct align *copy = malloc(sizeof *copy);
+    if (copy)
+        *copy = r->align;
+    n->ticket = ticket;
+    n->thing = copy;
+    if (err)
+        n->err = *err;
+    note_post(r->links.to_main, n);
+}
+
+// Only an idle thread may talk to the laser for it.
+static void ask_align(struct runner *r, struct note *n)
+{
+    struct gon_error err;
+    if (!r->run && !r->start && !r->align_asked) {
+        r->align_asked = n;
+        return;
+    }
+    gon_fail(&err, GON_E_REFUSED, "a run has the bench; see: gonio status");
+    tell_align(r, n->ticket, &err);
+    note_free(n);
+}
+
 // --- what the others say -------------------------------------------------------------------------
 
 static void take(struct runner *r, struct note *n)
@@ -85,6 +115,7 @@ static void take(struct runner *r, struct note *n)
     case NOTE_ARM:
     case NOTE_EXTEND:
     case NOTE_DISARM: change_arm(r, n); break;
+    case NOTE_ALIGN: ask_align(r, n); return;
     case NOTE_START: r->start = n; return;
     default: break;
     }
@@ -289,24 +320,57 @@ static void halt(struct runner *r)
     note_post(r->links.to_main, n);
 }
 
+static void begin_align(struct runner *r)
+{
+    struct note *n = r->align_asked;
+    struct gon_error err = {0};
+    const struct bench_laser *l = &r->links.bench->laser;
+    int rc = align_may(&r->align, l, n->power_w, n->for_s, &err);
+    if (rc >= 0 && l->arm == BENCH_ARM_RUN) // a person's own command
+        rc = arm_extend(instrument_arm(r->in), n->name, "alignment", n->for_s,
+                        instrument_now_ns(r->in), instrument_utc_ns(r->in) / 1000000, &err);
+    if (rc >= 0)
+        align_begin(&r->align, r->in, n->name, n->power_w, n->for_s, &err);
+    r->align_asked = NULL;
+    tell_align(r, n->ticket, &err);
+    note_free(n);
+}
+
+// A run and a stop end a session; other devices are not tended meanwhile: bringing one back may take
+// longer than the laser's lease.
+static void mind_align(struct runner *r)
+{
+    if (r->start || r->halt)
+        align_end(&r->align, r->in, r->start ? "a run begins" : "stopped");
+    align_step(&r->align, r->in);
+    if (r->align.changes == r->align_changes)
+        return;
+    r->align_changes = r->align.changes;
+    tell_align(r, 0, NULL);
+}
+
 static void idle(struct runner *r)
 {
     int64_t tend_ns = 0;
     const int most_ms = r->links.bench->devices_count ? SLICE_MS : IDLE_MS; // relays to be kept
     while (!r->quit) {
         int64_t now_ns = clk_now_ns(clk_system());
+        mind_align(r);
         if (r->start) {
             run(r);
             tend_ns = clk_now_ns(clk_system()) + CLK_MS(IDLE_MS); // an end that waits goes first
         } else if (r->halt) {
             halt(r);
-        } else if (now_ns >= tend_ns) {
+        } else if (r->align_asked) {
+            begin_align(r);
+        } else if (now_ns >= tend_ns && !r->align.running) {
             instrument_tend(r->in);
             send_snapshot(r);
             r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
             tend_ns = now_ns + CLK_MS(IDLE_MS);
         } else {
-            const int left_ms = (int)((tend_ns - now_ns) / 1000000) + 1;
+            const int left_ms =
+                r->align.running ? SLICE_MS : (int)((tend_ns - now_ns) / 1000000) + 1;
             struct note *n = note_wait(r->links.box, left_ms < most_ms ? left_ms : most_ms);
             if (n)
                 take(r, n);
@@ -330,6 +394,7 @@ static void *thread_main(void *ctx)
     instrument_watch(r->in, watch, r);
     idle(r);
     note_free(r->start);
+    note_free(r->align_asked);
     r->may_be_on = !instrument_free(r->in); // laser off, axes stopped
     return NULL;
 }

@@ -89,6 +89,12 @@ json_t *view_laser(const struct arming *a, const struct instrument_snapshot *s)
                             json_pack("{s:s, s:s, s:I, s:I}", "name", arm->name, "reason",
                                       arm->reason, "since_utc_ms", (json_int_t)arm->since_utc_ms,
                                       "until_utc_ms", (json_int_t)arm->until_utc_ms));
+    json_object_set_new(o, "align",
+                        a->align.running
+                            ? json_pack("{s:s, s:f, s:I}", "name", a->align.name, "power_w",
+                                        a->align.power_w, "until_utc_ms",
+                                        (json_int_t)a->align.until_utc_ms)
+                            : json_null());
     return o;
 }
 

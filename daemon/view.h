@@ -26,7 +26,7 @@ json_t *view_control(const struct control *c);
 
 // {"rule": "run" | "explicit", "arm_h", "arm": {"name", "reason", "since_utc_ms", "until_utc_ms"} or
 // null, "ended": why the last one did, "text": all of that, "light": "off" (read back), "on" (or may
-// be), "unknown"}; s NULL: not looked at yet
+// be), "unknown", "align": {"name", "power_w", "until_utc_ms"} or null}; s NULL: not looked at yet
 json_t *view_laser(const struct arming *a, const struct instrument_snapshot *s);
 
 // "axis", "laser", "detector", "monitor"; of a device its use: "shutter", "inputs", ...

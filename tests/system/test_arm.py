@@ -3,10 +3,11 @@
 brings it back."""
 import json
 import signal
+import time
 
 import pytest
 
-from conftest import query
+from conftest import query, wait_for
 
 PLAN = """\
 campaign: {
@@ -197,3 +198,64 @@ def test_what_is_no_arm_is_refused(bench):
         assert b.gonio("anna", "laser", *args).returncode == 2, args
     assert b.arm() is None
     assert b.daemon.request("POST", "/api/v1/laser", {"do": "arm", "for_s": 60}, name)[1]["arm"]["name"] == "anna"
+
+
+def test_no_alignment_unless_the_bench_allows_it(bench):
+    b = bench()
+    r = b.gonio("anna", "laser", "align", "--power", "0.001", "--for", "10min")
+    assert r.returncode == 4 and "laser.align_power_w" in r.stderr, r
+    assert not b.emits() and b.arm() is None
+
+
+def test_an_alignment_session_has_limits_and_ends(bench):
+    b = bench("align_power_w = 0.001;")
+    align = ("laser", "align", "--for", "10min", "--power")
+    for args in ((*align, "0.002"), ("laser", "align", "--power", "0.001", "--for", "31min"),
+                 ("laser", "align", "--power", "0.001"), ("laser", "align", "--for", "1min"),
+                 (*align, "0.001", "--reason", "x")):
+        r = b.gonio("anna", *args)
+        assert r.returncode == 2, (args, r)
+    assert not b.emits() and b.arm() is None
+
+    def begin(for_="10min"):
+        r = b.gonio("anna", "laser", "align", "--power", "0.001", "--for", for_)
+        assert r.returncode == 0 and "light: " in r.stdout, r
+        session = b.daemon.request("GET", "/api/v1/laser")[1]["align"]
+        assert session["name"] == "anna" and session["power_w"] == 0.001
+        assert b.emits()
+
+    begin()
+    assert b.gonio("bert", "laser", "align", "--power", "0.001", "--for", "1min").returncode == 4
+    r = b.gonio("bert", "run", "--detach", b.plan)
+    assert r.returncode == 4 and "anna aligns the laser" in r.stderr, r
+    time.sleep(1.5)  # three leases of the guard
+    assert b.emits()
+    for command in (("laser", "off"), ("stop",), ("laser", "disarm")):
+        r = b.gonio("bert", *command)
+        assert r.returncode == 0, (command, r)
+        wait_for(lambda: b.daemon.request("GET", "/api/v1/laser")[1]["align"] is None and not b.emits())
+        assert b.arm() is None
+        begin()
+    assert b.gonio("bert", "laser", "off").returncode == 0
+    wait_for(lambda: b.daemon.request("GET", "/api/v1/laser")[1]["align"] is None)
+    begin("2s")
+    wait_for(lambda: b.daemon.request("GET", "/api/v1/laser")[1]["align"] is None and not b.emits())
+    run, _ = measure(b)
+    r = b.gonio("anna", *align, "0.001")
+    assert r.returncode == 4 and f"run {run} has the bench" in r.stderr, r
+    assert b.gonio("anna", "stop").returncode == 0
+    begin()
+    b.sim.control(do="set", interlock="open")
+    wait_for(lambda: b.daemon.request("GET", "/api/v1/laser")[1]["align"] is None and not b.emits())
+    assert b.arm() is None
+    assert b.gonio("anna", *align, "0.001").returncode == 4 and not b.emits()
+
+
+def test_an_explicit_bench_wants_an_arm_for_alignment_too(bench):
+    b = bench('arm = "explicit"; align_power_w = 0.001;')
+    r = b.gonio("anna", "laser", "align", "--power", "0.001", "--for", "10min")
+    assert r.returncode == 4 and "not armed" in r.stderr, r
+    assert b.gonio("anna", "laser", "arm", "--for", "3s").returncode == 0
+    assert b.gonio("anna", "laser", "align", "--power", "0.001", "--for", "10min").returncode == 0
+    assert b.emits()
+    wait_for(lambda: b.daemon.request("GET", "/api/v1/laser")[1]["align"] is None and not b.emits())
