@@ -173,6 +173,30 @@ def test_a_lost_device_that_comes_back_leaves_the_arm(bench):
     assert b.arm() == armed and b.emits()
 
 
+def test_a_pause_taken_over_from_a_lost_device_ends_the_arm(bench):
+    b = bench('arm = "explicit";')
+    assert b.gonio("anna", "laser", "arm").returncode == 0
+    run, events = measure(b)
+    b.sim.control(do="unplug", wire="detector")
+    events.until_state(run, "paused")
+    assert b.arm() is not None
+    assert b.gonio("anna", "pause").returncode == 0
+    events.until(lambda e: e["event"] == "state" and e["state"] == "paused" and "by the operator" in e["text"])
+    assert b.arm() is None
+
+
+def test_laser_off_ends_an_arm_that_waits(bench):
+    b = bench('arm = "explicit"; align_power_w = 0.001;')
+    for _ in range(2):
+        assert b.gonio("anna", "laser", "arm").returncode == 0
+        # a session's own end leaves the arm
+        assert b.gonio("anna", "laser", "align", "--power", "0.001", "--for", "1s").returncode == 0
+        wait_for(lambda: b.daemon.request("GET", "/api/v1/laser")[1]["align"] is None)
+        assert not b.emits() and b.arm()["name"] == "anna"
+        assert b.gonio("bert", "laser", "off").returncode == 0
+        wait_for(lambda: b.arm() is None)
+
+
 @pytest.mark.parametrize("sig", [signal.SIGKILL, signal.SIGTERM])
 def test_a_restart_never_arms(bench, start_daemon, sig):
     b = bench()
