@@ -8,6 +8,7 @@
 #include <string.h>
 
 static const char *const regimes[] = {"underfilled", "overfilled", NULL};
+static const char *const arms[] = {"run", "explicit", NULL};
 static const char *const approaches[] = {"from-below", "from-above", NULL};
 
 #define TEXT(s, n, member, def, text)                                                              \
@@ -106,6 +107,13 @@ static const struct cfg_row laser_rows[] = {
     REAL(bench_config, "power_w", laser.power_w, "W", 1e-6, 100, NULL, "The set-point."),
     REAL(bench_config, "warmup_s", laser.warmup_s, "s", 0, 14400, NULL,
          "From emission to a steady beam."),
+    CHOICE(bench_config, "arm", laser.arm, arms, "\"run\"",
+           "Who arms the laser: the commands that start light, in their person's name, or only "
+           "gonio laser arm."),
+    REAL(bench_config, "arm_h", laser.arm_h, "h", 0.0003, 168, "12",
+         "For how long, where the command does not say it."),
+    REAL(bench_config, "align_power_w", laser.align_power_w, "W", 0, 100, "0",
+         "The most of gonio laser align; 0: not allowed."),
     CHOICE(
         bench_config, "polarisation", laser.polarisation, polarisation_names, NULL,
         "Of the light on the sample; \"unknown\" is an answer, and a warning with every result."),

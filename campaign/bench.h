@@ -62,11 +62,16 @@ struct bench_axis {
     double zero;            // position at step 0
 };
 
+enum bench_arm { BENCH_ARM_RUN, BENCH_ARM_EXPLICIT };
+
 struct bench_laser {
     char driver[BENCH_LINK]; // likewise
     char link[BENCH_LINK];
     double power_w;
     double warmup_s;
+    int arm;      // enum bench_arm: whether commands that start light arm the laser
+    double arm_h; // for how long, if nobody says
+    double align_power_w; // the most of an alignment session; 0: there is none
     int polarisation; // enum polarisation; POL_UNKNOWN is an answer, no answer is a mistake
 };
 

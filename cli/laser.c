@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // laser off: through the guard's STOP socket, which needs no goniod; where there is no guard, by
-// opening the laser here.
+// opening the laser here. The other words ask goniod (cli/laser_arm.c).
 #include "base/paths.h"
 #include "campaign/bench.h"
+#include "cli/laser_arm.h"
 #include "cli/out.h"
 #include "cli/verb.h"
 #include "drivers/device.h"
@@ -22,7 +23,8 @@
 #define MAY_BE_ON "LASER MAY BE ON: use its key or the interlock"
 
 struct options {
-    const char *socket, *bench, *link, *driver;
+    const char *socket, *bench, *link, *driver, *time, *reason;
+    double power_w;
     bool json;
 };
 
@@ -34,6 +36,12 @@ static const struct option_row rows[] = {
     {"--link", OPTION_TEXT, offsetof(struct options, link), "LINK", 0, 0,
      "or the laser's link, and"},
     {"--driver", OPTION_TEXT, offsetof(struct options, driver), "NAME", 0, 0, "its profile"},
+    {"--for", OPTION_TEXT, offsetof(struct options, time), "TIME", 0, 0,
+     "arm, align: so long, 8h, 90min, 30s; arm otherwise as the bench file says"},
+    {"--power", OPTION_REAL, offsetof(struct options, power_w), "W", 0, 100,
+     "align: the set-point, at most laser.align_power_w"},
+    {"--reason", OPTION_TEXT, offsetof(struct options, reason), "TEXT", 0, 0,
+     "arm: what for, for the others"},
     {"--json", OPTION_FLAG, offsetof(struct options, json), NULL, 0, 0, "print JSON"},
     VERB_OPTIONS_END,
 };
@@ -194,12 +202,20 @@ static int run_laser(const struct verb *verb, int argc, char **argv)
 {
     struct options o = {0};
     const char *what = NULL;
-    if (verb_take(verb, argc, argv, &o, &what, 1, 1) < 0)
+    if (verb_take(verb, argc, argv, &o, &what, 0, 1) < 0)
         return EXIT_INPUT;
-    if (strcmp(what, "off") != 0) {
-        out_say("laser: '%s': only off; a run switches on: gonio run FILE.cfg", what);
+    const bool off_asked = what && !strcmp(what, "off");
+    if (off_asked && (o.time || o.reason || o.power_w > 0)) {
+        out_say("laser off: --for, --reason and --power are for arm and align");
         return EXIT_INPUT;
     }
+    if (!off_asked && (o.bench || o.link || o.driver)) {
+        out_say("laser: --bench, --link and --driver are for laser off");
+        return EXIT_INPUT;
+    }
+    if (!off_asked)
+        return laser_ask(&(struct remote_options){o.socket, o.json}, what, o.time, o.reason,
+                         o.power_w);
     if (!o.link != !o.driver || (o.link && o.bench)) {
         out_say("laser off: --link and --driver belong together, and --bench gives both");
         return EXIT_INPUT;
@@ -209,9 +225,15 @@ static int run_laser(const struct verb *verb, int argc, char **argv)
 
 const struct verb verb_laser = {
     "laser",
-    "off",
-    "switch the laser off, also when goniod hangs or is dead",
-    "Switches the laser off through its guard, the process that holds its port and lives on when "
+    "[arm | disarm | align | off]",
+    "arm the laser, disarm it, switch it off",
+    "Without a word: whether the laser is armed, by whom and until when, and whether light comes "
+    "out. arm allows runs to switch it on, in the name in GONIO_NAME or your login; it switches "
+    "nothing on. It ends at its time, with disarm, with an operator's pause or one that waits for a "
+    "person, with a stop and with goniod; emission that is on then goes off and the run pauses.\n"
+    "align switches it on at a low power while no run has the bench, where the bench file allows it "
+    "(laser.align_power_w), for 30 min at most; laser off, disarm and stop end it.\n"
+    "off switches the laser off through its guard, the process that holds its port and lives on when "
     "goniod hangs or dies, and says so when the laser confirmed it; a run pauses then, and goes on "
     "after gonio resume. Where no guard is (goniod does not run), --bench FILE, or --link and "
     "--driver, opens the laser here and does the same. Status 0 only when off was read back; 1: "

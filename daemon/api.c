@@ -188,11 +188,20 @@ static struct http_reply get_events(const struct call *c)
 
 // --- commands -----------------------------------------------------------------------------------
 
+// By the name they give, or their account.
+static const char *caller(const struct call *c, char text[40])
+{
+    snprintf(text, 40, "uid %ld", c->request->uid);
+    return *c->request->name ? c->request->name : text;
+}
+
 static struct http_reply resume_run(const struct call *c, const json_t *what)
 {
     struct gon_error err;
+    char text[40];
+    const char *by = caller(c, text);
     if (json_is_string(what)) {
-        hub_submit_path(c->hub, json_string_value(what), c->ticket);
+        hub_submit_path(c->hub, json_string_value(what), by, c->ticket);
         return reply(HTTP_LATER, NULL);
     }
     json_int_t id = json_integer_value(what);
@@ -200,7 +209,7 @@ static struct http_reply resume_run(const struct call *c, const json_t *what)
         return fail(400, "\"resume\" is neither a run's number nor a path", NULL,
                     "see: gonio list");
     uint64_t event_id = hub_event_id(c->hub);
-    int rc = hub_submit(c->hub, (int)id, c->ticket, &err);
+    int rc = hub_submit(c->hub, (int)id, by, c->ticket, &err);
     if (rc < 0)
         return failed(&err);
     if (rc)
@@ -215,7 +224,8 @@ static struct http_reply create_run(const struct call *c, json_t *body)
     if (json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s}", "config", &config, "name", &name) < 0)
         return fail(400, e.text, "the request's body",
                     "send {\"config\": text, \"name\": path} or {\"resume\": run}");
-    hub_create(c->hub, config, name, c->ticket);
+    char text[40];
+    hub_create(c->hub, config, name, caller(c, text), c->ticket);
     return reply(HTTP_LATER, NULL);
 }
 
@@ -223,6 +233,9 @@ static struct http_reply post_runs(const struct call *c)
 {
     json_error_t e;
     char where[80];
+    struct gon_error err;
+    if (!queue_is_held(hub_queue(c->hub)) && arming_may_start(hub_arming(c->hub), &err) < 0)
+        return failed(&err);
     json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
     if (!body) {
         snprintf(where, sizeof where, "the request's body, line %d column %d", e.line, e.column);
@@ -305,6 +318,7 @@ static struct http_reply post_ack(const struct call *c)
     struct gon_error err;
     char by[300];
     const char *note = "";
+    char text[40];
     json_t *body = body_of(c, &e);
     const bool right = body && json_unpack_ex(body, &e, JSON_STRICT, "{s?s}", "note", &note) == 0;
     if (!right || !is_line(note, MOST_REASON)) {
@@ -315,7 +329,7 @@ static struct http_reply post_ack(const struct call *c)
         return r;
     }
     say_who(c, note, by, sizeof by);
-    const int run = hub_ack(c->hub, by, &err);
+    const int run = hub_ack(c->hub, by, caller(c, text), &err);
     json_decref(body);
     return told(c, run, &err);
 }
@@ -323,7 +337,9 @@ static struct http_reply post_ack(const struct call *c)
 static struct http_reply post_resume(const struct call *c)
 {
     struct gon_error err;
-    int run = hub_resume(c->hub, &err);
+    char text[40];
+    int run = arming_may_start(hub_arming(c->hub), &err);
+    run = run < 0 ? run : hub_resume(c->hub, caller(c, text), &err);
     return told(c, run, &err);
 }
 
@@ -382,6 +398,66 @@ static struct http_reply post_control(const struct call *c)
     return rc < 0 ? failed(&err) : get_control(c);
 }
 
+// --- the arm ------------------------------------------------------------------------------------
+
+static struct http_reply get_laser(const struct call *c)
+{
+    struct hub_status s;
+    hub_status(c->hub, &s);
+    return reply(200, view_text(view_laser(hub_arming(c->hub), s.snapshot)));
+}
+
+static int align(const struct call *c, double power_w, double for_s, struct gon_error *err)
+{
+    const struct run *active = queue_active(hub_queue(c->hub));
+    if (active)
+        return gon_fail(err, GON_E_REFUSED, "run %d has the bench; end it: gonio stop", active->id);
+    if (!*c->request->name)
+        return gon_fail(err, GON_E_INPUT, "alignment needs a name; set GONIO_NAME");
+    arming_align(hub_arming(c->hub), c->request->name, power_w, for_s, c->ticket);
+    return GON_OK;
+}
+
+static int change_arm(const struct call *c, const char *what, const char *reason, double for_s,
+                      double power_w, struct gon_error *err)
+{
+    char text[40], why[120];
+    if (!strcmp(what, "align"))
+        return align(c, power_w, for_s, err);
+    if (!strcmp(what, "arm") && for_s >= 0)
+        arming_arm(hub_arming(c->hub), c->request->name, reason, for_s, c->ticket);
+    else if (!strcmp(what, "disarm")) {
+        snprintf(why, sizeof why, "disarmed by %s", caller(c, text));
+        arming_disarm(hub_arming(c->hub), why, c->ticket);
+    } else
+        return gon_fail(err, GON_E_INPUT, "\"do\": \"%.40s\", for %g s; use arm, disarm or align", what,
+                        for_s);
+    return GON_OK;
+}
+
+// Whoever disarms makes things safer: that is everybody's.
+static struct http_reply post_laser(const struct call *c)
+{
+    json_error_t e;
+    struct gon_error err;
+    const char *what, *reason = NULL;
+    double for_s = 0, power_w = 0;
+    json_t *body = json_loadb(c->request->body, c->request->size, JSON_REJECT_DUPLICATES, &e);
+    if (!body || json_unpack_ex(body, &e, JSON_STRICT, "{s:s, s?s, s?F, s?F}", "do", &what,
+                                "reason", &reason, "for_s", &for_s, "power_w", &power_w) < 0) {
+        json_decref(body);
+        return fail(400, e.text, "the request's body",
+                    "send {\"do\": \"arm\"|\"disarm\"|\"align\", \"reason\": text, \"for_s\": seconds, "
+                    "\"power_w\": watts}");
+    }
+    int rc = strcmp(what, "disarm")
+                 ? control_check(hub_control(c->hub), c->request->name, &err)
+                 : GON_OK;
+    rc = rc < 0 ? rc : change_arm(c, what, reason, for_s, power_w, &err);
+    json_decref(body);
+    return rc < 0 ? failed(&err) : reply(HTTP_LATER, NULL);
+}
+
 // --- the queue ----------------------------------------------------------------------------------
 
 static struct http_reply get_queue(const struct call *c)
@@ -392,10 +468,12 @@ static struct http_reply get_queue(const struct call *c)
 static int arrange(const struct call *c, const char *what, int run, int place,
                    struct gon_error *err)
 {
-    char by[40];
+    char by[40], who[40];
     snprintf(by, sizeof by, "uid %ld", c->request->uid);
+    if (!strcmp(what, "release") && arming_may_start(hub_arming(c->hub), err) < 0)
+        return GON_E_REFUSED;
     if (!strcmp(what, "hold") || !strcmp(what, "release"))
-        return hub_queue_hold(c->hub, run, *what == 'h', err);
+        return hub_queue_hold(c->hub, run, *what == 'h', caller(c, who), err);
     if (!strcmp(what, "remove"))
         return hub_queue_remove(c->hub, run, by, err);
     if (!strcmp(what, "move"))
@@ -466,6 +544,8 @@ static const struct route {
     {"POST", "/api/v1/queue", post_queue, "GET, POST", true, NULL},
     {"GET", "/api/v1/control", get_control, "GET, POST", false, NULL},
     {"POST", "/api/v1/control", post_control, "GET, POST", false, NULL},
+    {"GET", "/api/v1/laser", get_laser, "GET, POST", false, NULL},
+    {"POST", "/api/v1/laser", post_laser, "GET, POST", false, NULL},
     {"GET", "/api/v1/events", get_events, "GET", false, NULL},
     {"POST", HTTP_STOP_PATH, post_stop, "POST", false, NULL},
     {"POST", "/api/v1/pause", post_pause, "POST", true, NULL},
@@ -503,7 +583,7 @@ struct http_reply api_request(void *hub, const struct http_request *request, uin
     if (!same_path)
         return fail(404, "there is no such resource", request->path,
                     "see /api/v1/status, /api/v1/devices, /api/v1/runs, /api/v1/queue, "
-                    "/api/v1/control, /api/v1/events, /metrics");
+                    "/api/v1/control, /api/v1/laser, /api/v1/events, /metrics");
     char use[40];
     snprintf(use, sizeof use, "use: %s", same_path->allow);
     struct http_reply r = fail(405, "that method is not for this resource", request->path, use);

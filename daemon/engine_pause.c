@@ -122,6 +122,7 @@ void engine_enter_pause(struct engine *e, const char *text)
 int engine_wait_for_operator(struct engine *e)
 {
     int64_t tend_ns = 0;
+    arm_end(instrument_arm(e->in), "the run was paused"); // whoever goes on answers for the light
     while (!resume_asked(e)) {
         (void)engine_pause_asked(e); // it is paused already
         if (engine_nap(e, CLK_MS(100)) < 0)

@@ -112,6 +112,8 @@ int engine_sit_out(struct engine *e)
     while (!is_over(e, &s)) {
         if (engine_pause_asked(e))
             return engine_take_over(e);
+        if (s.manual) // somebody has to look first
+            arm_end(instrument_arm(e->in), "the run was paused");
         take_resume(e, &s);
         if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;

@@ -32,6 +32,7 @@ struct hub {
     struct http *http;
     struct queue *queue;
     struct control control;
+    struct arming arming;
     struct messenger *messenger;          // NULL: nobody is told
     const char *notify[BENCH_NOTIFY + 1]; // its command
     struct storer *storer;
@@ -293,19 +294,22 @@ const struct queue *hub_queue(const struct hub *h)
     return h->queue;
 }
 
-void hub_create(struct hub *h, const char *config, const char *name, uint64_t ticket)
+void hub_create(struct hub *h, const char *config, const char *name, const char *by,
+                uint64_t ticket)
 {
     struct note *n = note_new(NOTE_CREATE);
     n->ticket = ticket;
+    n->by = note_text(by);
     n->text = note_text(config);
     n->name = note_text(name);
     note_post(h->store_box, n);
 }
 
-void hub_submit_path(struct hub *h, const char *path, uint64_t ticket)
+void hub_submit_path(struct hub *h, const char *path, const char *by, uint64_t ticket)
 {
     struct note *n = note_new(NOTE_LOOK);
     n->ticket = ticket;
+    n->by = note_text(by);
     n->name = note_text(path);
     note_post(h->store_box, n);
 }
@@ -317,30 +321,32 @@ static bool is_paused(const struct hub *h, int run)
 }
 
 // A run that only waits because it, or the queue, is held goes on first of all.
-static bool release(struct hub *h, int id)
+static bool release(struct hub *h, int id, const char *by)
 {
     const struct run *run = queue_run(h->queue, id);
     if ((!run->held && !queue_is_held(h->queue)) || queue_move(h->queue, id, 1, NULL) < 0)
         return false;
+    arming_start(&h->arming, by);
     queue_hold(h->queue, id, false, NULL);
     queue_hold(h->queue, 0, false, NULL);
     return true;
 }
 
-int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err)
+int hub_submit(struct hub *h, int run, const char *by, uint64_t ticket, struct gon_error *err)
 {
     const struct run *known = queue_run(h->queue, run);
     if (is_paused(h, run)) {
-        int rc = hub_resume(h, err);
+        int rc = hub_resume(h, by, err);
         return rc < 0 ? rc : 1;
     }
-    if (known && release(h, run))
+    if (known && release(h, run, by))
         return 1;
     int rc = known ? queue_may_submit(h->queue, run, err) : GON_OK;
     if (rc < 0)
         return rc;
     struct note *n = note_new(NOTE_LOOK);
     n->ticket = ticket;
+    n->by = note_text(by);
     n->run = run;
     n->name = note_text(known ? known->path : NULL);
     note_post(h->store_box, n);
@@ -381,13 +387,15 @@ bool hub_stop(struct hub *h, const char *why, uint64_t ticket)
     if (room)
         h->stops[h->stop_count++] = ticket;
     note_waiting(h);
+    arming_disarm(&h->arming, why, 0);
     if (!queue_stop(h->queue, why))
         note_post(h->run_box, note_new(NOTE_HALT));
     return room;
 }
 
-// The note is given away.
-static int to_active(struct hub *h, struct note *n, unsigned states, struct gon_error *err)
+// The note is given away. by: whose command starts light; NULL: it starts none.
+static int to_active(struct hub *h, struct note *n, unsigned states, const char *by,
+                     struct gon_error *err)
 {
     const struct run *run = queue_active(h->queue);
     int rc = GON_OK;
@@ -396,11 +404,14 @@ static int to_active(struct hub *h, struct note *n, unsigned states, struct gon_
     else if (!(states & 1u << run->state))
         rc = gon_fail(err, GON_E_REFUSED, "run %d is %s; see: gonio status", run->id,
                       run_state_name(run->state));
-    if (rc < 0)
+    if (rc < 0) {
         note_free(n);
-    else
-        note_post(h->run_box, n);
-    return rc < 0 ? rc : run->id;
+        return rc;
+    }
+    if (by)
+        arming_start(&h->arming, by);
+    note_post(h->run_box, n);
+    return run->id;
 }
 
 // One that waits for a device would go on by itself: it can be held too, once.
@@ -410,26 +421,26 @@ int hub_pause(struct hub *h, const char *by, bool now, struct gon_error *err)
     struct note *n = note_new(NOTE_PAUSE);
     n->text = note_text(by);
     n->last = now;
-    int rc = to_active(h, n, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, err);
+    int rc = to_active(h, n, 1u << RUN_PREPARING | 1u << RUN_RUNNING | waits, NULL, err);
     h->held = h->held || rc > 0;
     return rc;
 }
 
-int hub_ack(struct hub *h, const char *by, struct gon_error *err)
+int hub_ack(struct hub *h, const char *said, const char *by, struct gon_error *err)
 {
     const struct run *run = queue_active(h->queue);
     if (!run || !*run->asks)
         return gon_fail(err, GON_E_REFUSED, "nothing waits for a person; see: gonio status");
     struct note *n = note_new(NOTE_ACK);
-    n->text = note_text(by);
-    return to_active(h, n, 1u << RUN_PAUSED, err);
+    n->text = note_text(said);
+    return to_active(h, n, 1u << RUN_PAUSED, by, err);
 }
 
-int hub_resume(struct hub *h, struct gon_error *err)
+int hub_resume(struct hub *h, const char *by, struct gon_error *err)
 {
     struct queue_entry first;
     if (queue_idle(h->queue) && queue_is_held(h->queue) && queue_entries(h->queue, &first, 1)) {
-        queue_hold(h->queue, 0, false, NULL);
+        hub_queue_hold(h, 0, false, by, NULL);
         return first.run->id;
     }
     const struct run *run = queue_active(h->queue);
@@ -437,7 +448,12 @@ int hub_resume(struct hub *h, struct gon_error *err)
         return gon_fail(err, GON_E_REFUSED,
                         "run %d waits for a person: %s; when that is done: gonio ack", run->id,
                         run->asks);
-    return to_active(h, note_new(NOTE_RESUME), 1u << RUN_PAUSED, err);
+    return to_active(h, note_new(NOTE_RESUME), 1u << RUN_PAUSED, by, err);
+}
+
+struct arming *hub_arming(struct hub *h)
+{
+    return &h->arming;
 }
 
 // --- who commands --------------------------------------------------------------------------------
@@ -489,18 +505,24 @@ int hub_queue_move(struct hub *h, int run, int place, struct gon_error *err)
     return queue_move(h->queue, run, place, err);
 }
 
-int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err)
+int hub_queue_hold(struct hub *h, int run, bool held, const char *by, struct gon_error *err)
 {
+    if (!held)
+        arming_start(&h->arming, by);
     return queue_hold(h->queue, run, held, err);
 }
 
 // --- what the workers say ------------------------------------------------------------------------
 
-static int submit_known(struct hub *h, int run, struct gon_error *err)
+static int submit_known(struct hub *h, int run, const char *by, struct gon_error *err)
 {
-    if (!is_paused(h, run))
-        return queue_submit(h->queue, run, err);
-    int rc = hub_resume(h, err);
+    if (!is_paused(h, run)) {
+        const int rc = queue_submit(h->queue, run, err);
+        if (rc >= 0 && !queue_is_held(h->queue)) // before the material that starts it
+            arming_start(&h->arming, by);
+        return rc;
+    }
+    int rc = hub_resume(h, by, err);
     return rc < 0 ? rc : GON_OK;
 }
 
@@ -518,7 +540,7 @@ static void known(struct hub *h, struct note *n)
     struct gon_error err = n->err;
     uint64_t event_id = hub_event_id(h);
     struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
-    int rc = run ? submit_known(h, run->id, &err) : (int)err.code;
+    int rc = run ? submit_known(h, run->id, n->by, &err) : (int)err.code;
     if (rc == 0) {
         hub_answer_kept(h, n->ticket, 201, hub_submitted(h, run->id, event_id));
     } else {
@@ -573,6 +595,26 @@ static void halted(struct hub *h, const struct note *n)
     } else {
         answer_stopped(h, 200, json_pack("{s:n, s:s}", "run", "state", "idle"));
     }
+}
+
+static void armed(struct hub *h, const struct note *n)
+{
+    if (arming_told(&h->arming, n)) {
+        char text[400];
+        const struct align *a = &h->arming.align;
+        arm_describe(&h->arming.seen, text, sizeof text);
+        if (n->letter.kind == NOTE_ALIGNED && a->running)
+            snprintf(text, sizeof text, "%s aligns at %g W", a->name, a->power_w);
+        else if (n->letter.kind == NOTE_ALIGNED)
+            snprintf(text, sizeof text, "the alignment of %s ended: %s", a->name, a->end);
+        log_say(h->options.log, LOG_NOTICE, "laser", "%s", text);
+        publish(h, "laser", view_laser(&h->arming, h->snapshot));
+    }
+    if (n->ticket && n->err.code)
+        http_answer(h->http, n->ticket, api_status(n->err.code),
+                    api_error(n->err.code, n->err.text));
+    else if (n->ticket)
+        http_answer(h->http, n->ticket, 200, view_text(view_laser(&h->arming, h->snapshot)));
 }
 
 static void restored(struct hub *h, const struct note *n)
@@ -646,6 +688,8 @@ static void take(struct hub *h, struct note *n)
     case NOTE_ENDED: engine_ended(h, n); break;
     case NOTE_SNAPSHOT: take_snapshot(h, n); break;
     case NOTE_HALTED: halted(h, n); break;
+    case NOTE_ARMED:
+    case NOTE_ALIGNED: armed(h, n); break;
     default: break;
     }
 }
@@ -715,6 +759,7 @@ static int build(struct hub *h, int listen_fd, struct gon_error *err)
     h->store_box = mail_new();
     h->run_box = mail_new();
     h->fit_box = mail_new();
+    h->arming.to_runner = h->run_box;
     h->cancel = cancel_new();
     h->events = events_new(MOST_EVENTS, MOST_EVENT_BYTES, first_id);
     h->queue = queue_new(&q);
@@ -738,6 +783,7 @@ int hub_new(struct loop *loop, int listen_fd, const struct hub_options *options,
         return gon_fail(err, GON_E_SYSTEM, "daemon: out of memory");
     h->options = *options;
     h->loop = loop;
+    h->arming.rule = &options->bench->laser;
     h->start_ns = clk_now_ns(clk_system());
     int rc = build(h, listen_fd, err);
     if (rc < 0) {

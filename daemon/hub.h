@@ -3,6 +3,7 @@
 // and HTTP. It touches no device and no file itself.
 #pragma once
 #include "base/err.h"
+#include "daemon/arming.h"
 #include "daemon/control.h"
 #include "daemon/events.h"
 #include "daemon/http.h"
@@ -57,11 +58,13 @@ struct hub_status {
 };
 void hub_status(const struct hub *h, struct hub_status *ret_status);
 const struct queue *hub_queue(const struct hub *h);
-void hub_create(struct hub *h, const char *config, const char *name, uint64_t ticket);
+// by: whose command; in that name the laser is armed, where the bench has it so.
+void hub_create(struct hub *h, const char *config, const char *name, const char *by,
+                uint64_t ticket);
 // 1: the run was paused and goes on. 0: its file is looked at, known to the queue or not, and the
 // ticket is answered when it is queued or why it cannot be. GON_E_REFUSED: as queue_submit.
-int hub_submit(struct hub *h, int run, uint64_t ticket, struct gon_error *err);
-void hub_submit_path(struct hub *h, const char *path, uint64_t ticket);
+int hub_submit(struct hub *h, int run, const char *by, uint64_t ticket, struct gon_error *err);
+void hub_submit_path(struct hub *h, const char *path, const char *by, uint64_t ticket);
 void hub_find(struct hub *h, int run, uint64_t ticket); // one that the queue does not know
 // What becomes of readings of a run; takes the decision. The ticket is answered when it is written,
 // and the run queued when a sweep is to be measured again.
@@ -72,10 +75,13 @@ void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t tick
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket);
 // The run that has the bench: its id. by and now: as struct engine_asked.
 int hub_pause(struct hub *h, const char *by, bool now, struct gon_error *err);
-// A person's step is done; the run that waited for it. by: as of a pause.
-int hub_ack(struct hub *h, const char *by, struct gon_error *err);
+// A person's step is done; the run that waited for it. said: as by of a pause.
+int hub_ack(struct hub *h, const char *said, const char *by, struct gon_error *err);
 // The paused run, or when none has the bench a held queue: the id of the run that goes on.
-int hub_resume(struct hub *h, struct gon_error *err);
+int hub_resume(struct hub *h, const char *by, struct gon_error *err);
+
+// As arming.h. A change's ticket is answered with view_laser.
+struct arming *hub_arming(struct hub *h);
 
 // As control.h; the time is now.
 const struct control *hub_control(const struct hub *h);
@@ -86,7 +92,7 @@ int hub_control_release(struct hub *h, const char *name, struct gon_error *err);
 // The queue's order; as queue.h. by: who asks.
 int hub_queue_remove(struct hub *h, int run, const char *by, struct gon_error *err);
 int hub_queue_move(struct hub *h, int run, int place, struct gon_error *err);
-int hub_queue_hold(struct hub *h, int run, bool held, struct gon_error *err);
+int hub_queue_hold(struct hub *h, int run, bool held, const char *by, struct gon_error *err);
 
 uint64_t hub_event_id(const struct hub *h); // of the newest event
 // A run with the id of the event after which all of it can be followed, as JSON text.

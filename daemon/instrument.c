@@ -44,8 +44,20 @@ static void breathing_sleep_until(struct clk *clk, int64_t t_ns, const struct ca
     }
 }
 
+// Whatever switched the light off without being asked ends the arm, once for each alarm.
+static void step_arm(struct instrument *in)
+{
+    struct gon_error why;
+    const bool alarmed = instrument_alarm(in, &why) < 0;
+    arm_tick(&in->arm, instrument_now_ns(in));
+    if (alarmed && !in->alarmed)
+        arm_end(&in->arm, why.text);
+    in->alarmed = alarmed;
+}
+
 void instrument_breathe(struct instrument *in)
 {
+    step_arm(in);
     const int talking = in->talking; // a driver that waits in the middle of its talk
     if (in->safety && safety_tick(in->safety))
         instrument_emission_off(in, NULL);
@@ -219,6 +231,7 @@ static int begin_laser(struct instrument *in, char *ret_identity, size_t size,
     if (!(in->safety = safety_new(laser, &in->breathing.clk)))
         return gon_fail(err, GON_E_SYSTEM, "out of memory");
     safety_guard(in->safety, in->guard);
+    safety_arm(in->safety, &in->arm);
     safety_obey(in->safety, in->stop);
     return safety_begin(in->safety, ret_identity, size, err);
 }
@@ -382,6 +395,7 @@ int instrument_new(const struct bench_config *bench, const struct instrument_par
         instrument_free(in);
         return gon_fail(err, GON_E_SYSTEM, "instrument: out of memory");
     }
+    safety_arm(in->safety, &in->arm);
     return hand_over(in, ret_instrument, err);
 }
 

@@ -20,6 +20,7 @@
 #include "base/clk.h"
 #include "base/err.h"
 #include "campaign/bench.h"
+#include "daemon/arm.h"
 #include "daemon/safety.h"
 #include "daemon/suspend.h"
 #include "drivers/axis.h"
@@ -197,11 +198,14 @@ int instrument_power(struct instrument *in, double power_w, struct gon_error *er
 int instrument_emission_on(struct instrument *in, struct gon_error *err);
 int instrument_emission_off(struct instrument *in, struct gon_error *err);
 void instrument_permit(struct instrument *in, bool running);
+// Who armed the laser. The instrument ends it when it runs out and when the alarm rises; whoever
+// else changes it does so by its rules, on this thread.
+struct arm *instrument_arm(struct instrument *in);
 // Once this stop is asked for, off goes out in the next slice of whatever is waited for, also in
 // the middle of another device's call. Borrowed until the next call; NULL: none.
 void instrument_obey(struct instrument *in, const struct cancel *stop);
-// What the laser's guard did without being asked, since the permission was given: 0, or why. The
-// laser is off then, or its guard is gone.
+// What the laser's guard did without being asked, or that the arm ended in the light, since the
+// permission was given: 0, or why. The laser is off then, or goes off, or its guard is gone.
 int instrument_alarm(const struct instrument *in, struct gon_error *err);
 enum safety_light instrument_light_left(const struct instrument *in); // what may be said of it
 const struct safety *instrument_safety(const struct instrument *in);

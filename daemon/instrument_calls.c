@@ -199,6 +199,11 @@ void instrument_permit(struct instrument *in, bool running)
         safety_permit(in->safety, running);
 }
 
+struct arm *instrument_arm(struct instrument *in)
+{
+    return &in->arm;
+}
+
 void instrument_obey(struct instrument *in, const struct cancel *stop)
 {
     in->stop = stop;

@@ -65,6 +65,8 @@ struct instrument {
     struct guard_host host;   // no connect: there is no guard process
     struct guard_link *guard; // NULL: not needed yet
     struct safety *safety;
+    struct arm arm;
+    bool alarmed; // the arm heard of the alarm that stands
     enum safety_light behind; // of the laser whose place another took; SAFETY_LIGHT_OFF: none did
     const struct cancel *stop; // that the laser obeys; NULL: none
     struct laser_status laser;

@@ -28,6 +28,7 @@ void note_free(struct note *n)
         (n->drop ? n->drop : free)(n->thing);
     free(n->text);
     free(n->name);
+    free(n->by);
     free(n);
 }
 

@@ -14,8 +14,8 @@ enum note_kind {
     NOTE_QUIT, // to every worker: end
     // to the store thread
     NOTE_LIST,    // which campaigns are there
-    NOTE_CREATE,  // ticket, text: config, name: of its file: make a campaign file
-    NOTE_LOOK,    // ticket, name: path, or run: can this campaign go on
+    NOTE_CREATE,  // ticket, by, text: config, name: of its file: make a campaign file
+    NOTE_LOOK,    // ticket, by, name: path, or run: can this campaign go on
     NOTE_FIND,    // ticket, run: is there such a campaign
     NOTE_OPEN,    // run, name: path: for writing
     NOTE_READING, // run, sequence, thing: struct store_reading
@@ -33,13 +33,17 @@ enum note_kind {
     NOTE_RESUME,
     NOTE_ACK,     // text: by whom
     NOTE_HALT,    // while no run: laser off, axes stopped
+    NOTE_ARM,     // ticket (0: none), name: whose, text: reason, for_s: arm the laser
+    NOTE_EXTEND,  // the same, unless it is armed for longer
+    NOTE_DISARM,  // ticket, text: why
+    NOTE_ALIGN,   // ticket, name: whose, power_w, for_s: an alignment session
     // to the fit thread
     NOTE_FIT_WANTED, // run, sweep, last, name: path
     // to the main thread
     NOTE_RESTORED, // thing: struct state_queue of an earlier life; after the runs, before their end
     NOTE_UNKEPT,   // err: why the queue could not be kept, or (before LISTED's end) not be read
     NOTE_LISTED,   // thing: struct run (one a note); NULL: that was all; err
-    NOTE_KNOWN,    // ticket, thing: struct run; NULL: err, and text: all complaints
+    NOTE_KNOWN,    // ticket, by, thing: struct run; NULL: err, and text: all complaints
     NOTE_FOUND,    // ticket, run, thing: struct run; NULL: there is none
     NOTE_OPENED,   // run, thing: struct run_material; NULL: err
     NOTE_FITTED,   // run, sweep, last, text: JSON; NULL: err
@@ -49,7 +53,9 @@ enum note_kind {
     NOTE_FIT_ASKED, // run, sweep, last
     NOTE_ENDED,    // run, state, err
     NOTE_SNAPSHOT, // thing: struct instrument_snapshot
-    NOTE_HALTED    // err
+    NOTE_HALTED,   // err
+    NOTE_ARMED,    // ticket (0: none), thing: struct arm as it is now, err: why it is not as asked
+    NOTE_ALIGNED   // ticket (0: none), thing: struct align as it is now, err: likewise
 };
 
 struct note {
@@ -61,7 +67,8 @@ struct note {
     struct gon_error err; // code 0: none
     struct engine_event event; // its text is the note's
     const char *level, *source; // static texts
-    char *text, *name;
+    double for_s, power_w;
+    char *text, *name, *by; // by: whose command
     void *thing;
     void (*drop)(void *thing); // how to free the thing; NULL: free
 };

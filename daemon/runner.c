@@ -5,6 +5,8 @@
 #include "base/clk.h"
 #include "base/log.h"
 #include "campaign/store.h"
+#include "daemon/align.h"
+#include "daemon/arm.h"
 #include "daemon/engine.h"
 #include "daemon/instrument.h"
 #include "daemon/instrument_suspend.h"
@@ -38,10 +40,70 @@ struct runner {
     bool pause, resume, ack, halt, quit;
     char acked_by[300];
     struct engine_asked asked; // of that pause
+    uint64_t arm_changes;      // of the arm, as told
+    struct align align;
+    uint64_t align_changes;   // of it, as told
+    struct note *align_asked; // held until the thread is idle
     struct note *start;       // the next run, held until the thread is idle
     int64_t next_snapshot_ns; // not before every part was asked once
     bool may_be_on;           // of the laser, at the thread's end
 };
+
+// --- the arm -------------------------------------------------------------------------------------
+
+static void tell_arm(struct runner *r, uint64_t ticket, const struct gon_error *err)
+{
+    struct note *n = note_new(NOTE_ARMED);
+    struct arm *copy = malloc(sizeof *copy);
+    if (copy)
+        *copy = *instrument_arm(r->in);
+    n->ticket = ticket;
+    n->thing = copy;
+    if (err)
+        n->err = *err;
+    note_post(r->links.to_main, n);
+}
+
+static void change_arm(struct runner *r, const struct note *n)
+{
+    struct arm *arm = instrument_arm(r->in);
+    const int64_t now_ns = instrument_now_ns(r->in), utc_ms = instrument_utc_ns(r->in) / 1000000;
+    struct gon_error err = {0};
+    if (n->letter.kind == NOTE_ARM)
+        arm_set(arm, n->name, n->text, n->for_s, now_ns, utc_ms, &err);
+    else if (n->letter.kind == NOTE_EXTEND)
+        arm_extend(arm, n->name, n->text, n->for_s, now_ns, utc_ms, &err);
+    else
+        arm_end(arm, n->text);
+    if (n->ticket)
+        tell_arm(r, n->ticket, &err);
+}
+
+static void tell_align(struct runner *r, uint64_t ticket, const struct gon_error *err)
+{
+    struct note *n = note_new(NOTE_ALIGNED);
+    struct align *copy = malloc(sizeof *copy);
+    if (copy)
+        *copy = r->align;
+    n->ticket = ticket;
+    n->thing = copy;
+    if (err)
+        n->err = *err;
+    note_post(r->links.to_main, n);
+}
+
+// Only an idle thread may talk to the laser for it.
+static void ask_align(struct runner *r, struct note *n)
+{
+    struct gon_error err;
+    if (!r->run && !r->start && !r->align_asked) {
+        r->align_asked = n;
+        return;
+    }
+    gon_fail(&err, GON_E_REFUSED, "a run has the bench; see: gonio status");
+    tell_align(r, n->ticket, &err);
+    note_free(n);
+}
 
 // --- what the others say -------------------------------------------------------------------------
 
@@ -64,6 +126,10 @@ static void take(struct runner *r, struct note *n)
         r->acknowledged = n->sequence;
         r->answer = n->err;
         break;
+    case NOTE_ARM:
+    case NOTE_EXTEND:
+    case NOTE_DISARM: change_arm(r, n); break;
+    case NOTE_ALIGN: ask_align(r, n); return;
     case NOTE_START: r->start = n; return;
     default: break;
     }
@@ -86,12 +152,42 @@ static void send_snapshot(struct runner *r)
     note_post(r->links.to_main, n);
 }
 
+// Events are committed in order with the readings; nobody waits for them.
+static int store_event_port(void *ctx, const char *level, const char *source, const char *text,
+                            struct gon_error *err)
+{
+    struct runner *r = ctx;
+    struct note *n = note_new(NOTE_EVENT);
+    (void)err;
+    n->run = r->run;
+    n->level = level;
+    n->source = source;
+    n->text = note_text(text);
+    note_post(r->links.to_store, n);
+    return GON_OK;
+}
+
+// In the file too, while a run has the bench.
+static void watch_arm(struct runner *r)
+{
+    const struct arm *arm = instrument_arm(r->in);
+    char text[ARM_NAME + ARM_END + ARM_REASON + 40];
+    if (arm->changes == r->arm_changes)
+        return;
+    r->arm_changes = arm->changes;
+    tell_arm(r, 0, NULL);
+    arm_describe(arm, text, sizeof text);
+    if (r->run)
+        store_event_port(r, "notice", "laser", text, NULL);
+}
+
 // Between the slices of every wait.
 static void watch(void *ctx)
 {
     struct runner *r = ctx;
     int64_t now_ns = clk_now_ns(clk_system());
     take_all(r);
+    watch_arm(r);
     if (now_ns < r->next_snapshot_ns)
         return;
     r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
@@ -148,21 +244,6 @@ static int store_reading_port(void *ctx, const struct store_reading *reading, st
     if (r->acknowledged == r->sequence)
         r->reading_open = false;
     return rc;
-}
-
-// Events are committed in order with the readings; nobody waits for them.
-static int store_event_port(void *ctx, const char *level, const char *source, const char *text,
-                            struct gon_error *err)
-{
-    struct runner *r = ctx;
-    struct note *n = note_new(NOTE_EVENT);
-    (void)err;
-    n->run = r->run;
-    n->level = level;
-    n->source = source;
-    n->text = note_text(text);
-    note_post(r->links.to_store, n);
-    return GON_OK;
 }
 
 static void publish_port(void *ctx, const struct engine_event *event)
@@ -254,6 +335,8 @@ static void run(struct runner *r)
         .take_pause = take_pause_port,
         .take_ack = take_ack_port,
     };
+    r->arm_changes = 0; // who armed it before belongs into this file as well
+    watch_arm(r);
     n->run = r->run;
     n->state = engine_run(&ports, r->in, &m->config, &m->plan, &n->err);
     r->run = 0;
@@ -274,24 +357,57 @@ static void halt(struct runner *r)
     note_post(r->links.to_main, n);
 }
 
+static void begin_align(struct runner *r)
+{
+    struct note *n = r->align_asked;
+    struct gon_error err = {0};
+    const struct bench_laser *l = &r->links.bench->laser;
+    int rc = align_may(&r->align, l, n->power_w, n->for_s, &err);
+    if (rc >= 0 && l->arm == BENCH_ARM_RUN) // a person's own command
+        rc = arm_extend(instrument_arm(r->in), n->name, "alignment", n->for_s,
+                        instrument_now_ns(r->in), instrument_utc_ns(r->in) / 1000000, &err);
+    if (rc >= 0)
+        align_begin(&r->align, r->in, n->name, n->power_w, n->for_s, &err);
+    r->align_asked = NULL;
+    tell_align(r, n->ticket, &err);
+    note_free(n);
+}
+
+// A run and a stop end a session; other devices are not tended meanwhile: bringing one back may take
+// longer than the laser's lease.
+static void mind_align(struct runner *r)
+{
+    if (r->start || r->halt)
+        align_end(&r->align, r->in, r->start ? "a run begins" : "stopped");
+    align_step(&r->align, r->in);
+    if (r->align.changes == r->align_changes)
+        return;
+    r->align_changes = r->align.changes;
+    tell_align(r, 0, NULL);
+}
+
 static void idle(struct runner *r)
 {
     int64_t tend_ns = 0;
     const int most_ms = r->links.bench->devices_count ? SLICE_MS : IDLE_MS; // relays to be kept
     while (!r->quit) {
         int64_t now_ns = clk_now_ns(clk_system());
+        mind_align(r);
         if (r->start) {
             run(r);
             tend_ns = clk_now_ns(clk_system()) + CLK_MS(IDLE_MS); // an end that waits goes first
         } else if (r->halt) {
             halt(r);
-        } else if (now_ns >= tend_ns) {
+        } else if (r->align_asked) {
+            begin_align(r);
+        } else if (now_ns >= tend_ns && !r->align.running) {
             instrument_tend(r->in);
             send_snapshot(r);
             r->next_snapshot_ns = now_ns + SNAPSHOT_NS;
             tend_ns = now_ns + CLK_MS(IDLE_MS);
         } else {
-            const int left_ms = (int)((tend_ns - now_ns) / 1000000) + 1;
+            const int left_ms =
+                r->align.running ? SLICE_MS : (int)((tend_ns - now_ns) / 1000000) + 1;
             struct note *n = note_wait(r->links.box, left_ms < most_ms ? left_ms : most_ms);
             if (n)
                 take(r, n);
@@ -316,6 +432,7 @@ static void *thread_main(void *ctx)
     instrument_disk(r->in, free_mb, r);
     idle(r);
     note_free(r->start);
+    note_free(r->align_asked);
     r->may_be_on = !instrument_free(r->in); // laser off, axes stopped
     return NULL;
 }

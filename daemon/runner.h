@@ -2,7 +2,8 @@
 // The instrument thread: it alone owns the bench. It runs queued campaigns (engine_run); while it
 // has none it asks each device once a second how it is and brings back those that were lost. It
 // tells the main thread what happens and waits for the store's acknowledgements, keeping the
-// laser's lease meanwhile.
+// laser's lease meanwhile. The arm lives here (daemon/arm.h): whoever changes it writes a letter, and
+// each change is told.
 #pragma once
 #include "base/err.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/safety.h"
 
+#include "daemon/arm.h"
 #include "drivers/guard_link.h"
 
 #include <stdlib.h>
@@ -16,8 +17,9 @@ struct safety {
     bool obeyed;   // the stop was told once
     bool warned;   // the alarm was
     const struct cancel *stop;
+    const struct arm *arm;    // NULL: nobody armed it
     struct guard_link *guard; // NULL: none
-    struct gon_error alarm;   // of the guard's; code 0: none
+    struct gon_error alarm;   // of the guard's or the arm's; code 0: none
     int64_t tick_ns, worst_gap_ns;
 };
 
@@ -35,6 +37,11 @@ struct safety *safety_new(struct laser *laser, struct clk *clk)
 void safety_guard(struct safety *s, struct guard_link *guard)
 {
     s->guard = guard;
+}
+
+void safety_arm(struct safety *s, const struct arm *arm)
+{
+    s->arm = arm;
 }
 
 bool safety_free(struct safety *s)
@@ -92,9 +99,14 @@ static int check_may_emit(struct safety *s, struct gon_error *err)
         return gon_fail(err, GON_E_REFUSED, "stays off: no campaign is running");
     if (s->alarm.code)
         return safety_alarm(s, err);
+    int rc = arm_check(s->arm, clk_now_ns(s->clk), err);
+    if (rc < 0) {
+        gon_prefix(err, "stays off");
+        return rc;
+    }
     if (s->pending)
         return gon_fail(err, GON_E_REFUSED, "stays off: an earlier OFF was not confirmed");
-    int rc = safety_status(s, &now, err);
+    rc = safety_status(s, &now, err);
     if (rc < 0)
         return rc;
     if (!now.interlock_closed || now.state == LASER_INTERLOCK)
@@ -188,6 +200,15 @@ static void mind_guard(struct safety *s)
         s->pending = true;
 }
 
+// Light that nobody answers for goes off, and the run learns of it as of the guard's doing.
+static void mind_arm(struct safety *s)
+{
+    if (!s->emission || s->alarm.code || arm_is_live(s->arm, clk_now_ns(s->clk)))
+        return;
+    gon_fail(&s->alarm, GON_E_REFUSED, "switched off, as the arm of %s ended: %s",
+             s->arm ? s->arm->name : "nobody", s->arm && *s->arm->end ? s->arm->end : "it ran out");
+}
+
 int safety_alarm(const struct safety *s, struct gon_error *err)
 {
     return s->alarm.code ? gon_fail(err, s->alarm.code, "%s", s->alarm.text) : 0;
@@ -195,6 +216,7 @@ int safety_alarm(const struct safety *s, struct gon_error *err)
 
 bool safety_tick(struct safety *s)
 {
+    mind_arm(s);
     mind_guard(s);
     keep_alive(s);
     const int64_t now_ns = clk_now_ns(s->clk);

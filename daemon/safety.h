@@ -4,7 +4,9 @@
 //
 //  - before anything else is sent to a laser it is switched off and that is read back
 //  (safety_begin);
-//  - on only while a run has permission (safety_permit) and the interlock reads closed; sent once;
+//  - on only while a run has permission (safety_permit), the laser is armed (safety_arm) and the
+//    interlock reads closed; sent once. An arm that ends while emission is on raises the alarm, see
+//    below;
 //  - off is sent until it was read back, at most for SAFETY_OFF_S; when that fails the answer is
 //    GON_E_DEVICE and "LASER MAY BE ON", and the rule "off" stays in force: every later tick of an
 //    idle instrument tries again (safety_pending);
@@ -12,8 +14,8 @@
 //    due, once for each stop; whoever ends the run repeats it until it is read back;
 //  - emission is a lease: while it is on, whoever waits calls safety_tick at least every 200 ms.
 //    With a guard process (safety_guard) that renews the lease: 500 ms of silence, or our death,
-//    and the guard switches off. Then, after gonio laser off, and when the guard itself is gone,
-//    the alarm stands (safety_alarm), off is due, and on is refused until the permission is taken
+//    and the guard switches off. Then, after gonio laser off, when the guard itself is gone, and
+//    when the arm ended, the alarm stands (safety_alarm), off is due, and on is refused until the permission is taken
 //    back (again); without permission off is pending. A laser with a lease of its own (keep_alive)
 //    is told in the same tick, and no longer once off was sent: it goes off by itself when this
 //    thread hangs.
@@ -27,6 +29,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+struct arm;
 struct guard_link;
 struct link_stats;
 struct safety;
@@ -46,6 +49,8 @@ struct safety *safety_new(struct laser *laser, struct clk *clk);
 // The guard that holds the laser's port, borrowed: it does the switching off and reads it back.
 // Without one the laser's driver does; that is for tests.
 void safety_guard(struct safety *s, struct guard_link *guard);
+// Who armed the laser, borrowed; its owner steps it on this thread. NULL, as at first: nobody.
+void safety_arm(struct safety *s, const struct arm *arm);
 // Off first, as well as the link allows; false when it was not read back. NULL is fine.
 bool safety_free(struct safety *s);
 
@@ -59,7 +64,7 @@ int safety_reopen(struct safety *s, char *ret_text, size_t size, struct gon_erro
 void safety_permit(struct safety *s, bool running);
 int safety_set_power(struct safety *s, double power_w, struct gon_error *err);
 
-// GON_E_REFUSED: no running campaign, interlock open, key; GON_E_DEVICE: fault. Accepted is not
+// GON_E_REFUSED: no running campaign, not armed, interlock open, key; GON_E_DEVICE: fault. Accepted is not
 // light.
 int safety_on(struct safety *s, struct gon_error *err);
 int safety_off(struct safety *s, struct gon_error *err);
@@ -69,7 +74,8 @@ void safety_obey(struct safety *s, const struct cancel *stop);
 // Renews the lease; costs nothing while emission is off. True when off is due: a stop was asked for
 // with the light on, or the guard raised the alarm, and the laser is not being talked to.
 bool safety_tick(struct safety *s);
-// What the guard did without being asked, or that it is gone, since the last end of a run: 0, or
+// What the guard did without being asked, or that it is gone, or that the arm ended in the light,
+// since the last end of a run: 0, or
 // GON_E_REFUSED or GON_E_DEVICE.
 int safety_alarm(const struct safety *s, struct gon_error *err);
 

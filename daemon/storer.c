@@ -196,6 +196,7 @@ static void answer_known(struct storer *s, const struct note *question, enum not
 {
     struct note *n = note_new(kind);
     n->ticket = question->ticket;
+    n->by = note_text(question->by);
     n->run = question->run;
     n->last = question->last;
     n->count = question->count;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon/view.h"
 
+#include "campaign/bench.h"
 #include "campaign/store.h"
 
 #include <math.h>
@@ -70,6 +71,32 @@ json_t *view_control(const struct control *c)
         return json_null();
     return json_pack("{s:s, s:s, s:I}", "name", c->name, "reason", c->reason, "since_utc_ms",
                      (json_int_t)c->since_utc_ms);
+}
+
+json_t *view_laser(const struct arming *a, const struct instrument_snapshot *s)
+{
+    const struct arm *arm = &a->seen;
+    json_t *o = json_pack("{s:s, s:f, s:n}", "rule", a->rule->arm == BENCH_ARM_RUN ? "run" : "explicit",
+                          "arm_h", a->rule->arm_h, "arm");
+    const char *light = !s ? "unknown" : instrument_is_dark(s) ? "off"
+                        : s->emission || s->laser.emission     ? "on" : "unknown";
+    char text[400];
+    arm_describe(arm, text, sizeof text);
+    json_object_set_new(o, "text", json_string(text));
+    json_object_set_new(o, "light", json_string(light));
+    json_object_set_new(o, "ended", json_string(arm->end));
+    if (arm->live)
+        json_object_set_new(o, "arm",
+                            json_pack("{s:s, s:s, s:I, s:I}", "name", arm->name, "reason",
+                                      arm->reason, "since_utc_ms", (json_int_t)arm->since_utc_ms,
+                                      "until_utc_ms", (json_int_t)arm->until_utc_ms));
+    json_object_set_new(o, "align",
+                        a->align.running
+                            ? json_pack("{s:s, s:f, s:I}", "name", a->align.name, "power_w",
+                                        a->align.power_w, "until_utc_ms",
+                                        (json_int_t)a->align.until_utc_ms)
+                            : json_null());
+    return o;
 }
 
 json_t *view_flags(unsigned flags)

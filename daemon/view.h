@@ -2,6 +2,7 @@
 // What the daemon knows, as JSON: the resources of /api/v1 and the events of its stream share
 // these. A number that is not known is null. The caller owns what is returned; NULL without memory.
 #pragma once
+#include "daemon/arming.h"
 #include "daemon/control.h"
 #include "daemon/instrument.h"
 #include "daemon/queue.h"
@@ -22,6 +23,11 @@ json_t *view_queue(const struct queue *q);
 
 // {"name", "reason", "since_utc_ms"}; null: nobody has control
 json_t *view_control(const struct control *c);
+
+// {"rule": "run" | "explicit", "arm_h", "arm": {"name", "reason", "since_utc_ms", "until_utc_ms"} or
+// null, "ended": why the last one did, "text": all of that, "light": "off" (read back), "on" (or may
+// be), "unknown", "align": {"name", "power_w", "until_utc_ms"} or null}; s NULL: not looked at yet
+json_t *view_laser(const struct arming *a, const struct instrument_snapshot *s);
 
 // "axis", "laser", "detector", "monitor"; of a device its use: "shutter", "inputs", ...
 const char *view_kind(const struct instrument_snapshot *s, int part);

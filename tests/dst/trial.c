@@ -200,6 +200,14 @@ static void begin(struct trial *t, const struct trial_spec *spec)
     if (instrument_open(&t->bench, NULL, clk_system(), &t->in, &err) < 0)
         give_up("the bench", err.text);
     instrument_watch(t->in, breathed, t);
+    trial_arm(t);
+}
+
+// Whoever starts a run or goes on with one answers for the light.
+void trial_arm(struct trial *t)
+{
+    (void)arm_set(instrument_arm(t->in), "operator", NULL, ARM_MOST_S, instrument_now_ns(t->in), 0,
+                  NULL);
 }
 
 static uint64_t hash_rows(sqlite3 *db, const char *sql, uint64_t hash)
@@ -335,6 +343,7 @@ static void go_on(struct trial *t)
     t->seen.stops += t->seen.begun;
     t->reading_open = t->resume = t->wants_pause = t->paused = false;
     watch_resume(&t->watch);
+    trial_arm(t);
 }
 
 void trial_run(const struct trial_spec *spec, struct trial_result *ret_result)

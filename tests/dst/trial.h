@@ -107,5 +107,6 @@ struct trial_result {
 void trial_run(const struct trial_spec *spec, struct trial_result *ret_result);
 
 // For parts of it.
+void trial_arm(struct trial *t);
 void trial_ports(struct trial *t, struct engine_ports *ret_ports);
 void trial_aim(struct trial *t, enum trial_moment now, int64_t at_ns); // it is that moment

@@ -198,6 +198,8 @@ static bool take_resume(void *ctx)
     const bool was = t->resume;
     t->resume = false;
     t->resumed |= was;
+    if (was)
+        trial_arm(t);
     return was;
 }
 

@@ -4,6 +4,7 @@
 // made to fail.
 #pragma once
 #include "base/clk.h"
+#include "daemon/arm.h"
 #include "daemon/instrument.h"
 #include "drivers/axis.h"
 #include "drivers/detector.h"
@@ -489,4 +490,10 @@ static inline struct instrument_parts simbench_parts(struct simbench *b)
     for (int i = 0; i < world_axes(&b->world.spec); i++)
         parts.axis[i] = &b->axis[i].axis;
     return parts;
+}
+
+// As a person's command does.
+static inline void simbench_arm(struct instrument *in)
+{
+    (void)arm_set(instrument_arm(in), "anna", NULL, ARM_MOST_S, instrument_now_ns(in), 0, NULL);
 }

@@ -200,6 +200,8 @@ static inline bool port_resume(void *ctx)
     struct run *r = ctx;
     bool now = r->auto_resume || r->want_resume;
     r->want_resume = false;
+    if (now)
+        simbench_arm(r->in);
     return now;
 }
 
@@ -300,6 +302,7 @@ static inline struct run *begin_on(const struct world_spec *spec, const struct b
         simdevices_parts(&r->devices, &r->bench, &parts);
     }
     assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
+    simbench_arm(r->in);
     return r;
 }
 

@@ -132,6 +132,7 @@ static void a_point_on_a_fast_bench_costs_40_ms(void **state)
     instrument_free(r->in);
     struct instrument_parts parts = simbench_parts(&r->b);
     assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
+    simbench_arm(r->in);
     const int64_t start_ns = r->b.clk.t_ns;
     assert_int_equal(go(r), RUN_DONE);
     assert_complete(r);
@@ -695,6 +696,7 @@ static void gear(struct run *r)
     struct instrument_parts parts = simbench_parts(&r->b);
     instrument_free(r->in);
     assert_int_equal(instrument_new(&r->bench, &parts, &r->b.clk.clk, &r->in, NULL), 0);
+    simbench_arm(r->in);
 }
 
 static void another_bench_of_the_same_motors_measures_the_same(void **state)

@@ -30,6 +30,7 @@ static void make(struct setting *s)
 {
     struct instrument_parts parts = simbench_parts(&s->b);
     assert_int_equal(instrument_new(&s->bench, &parts, &s->b.clk.clk, &s->in, NULL), 0);
+    simbench_arm(s->in);
 }
 
 // Of a bench with the world's three axes.
@@ -371,6 +372,7 @@ static void a_bench_without_a_sample_stage_has_none(void **state)
     struct instrument_parts parts = simbench_parts(&s->b);
     parts.axis[PART_SAMPLE] = NULL;
     assert_int_equal(instrument_new(&s->bench, &parts, &s->b.clk.clk, &s->in, NULL), 0);
+    simbench_arm(s->in);
     assert_false(instrument_has(s->in, PART_SAMPLE));
     assert_int_equal(instrument_tend(s->in), 0);
     end(s);

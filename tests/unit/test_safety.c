@@ -10,9 +10,11 @@
 
 static struct safety *begin(struct simbench *b)
 {
+    static const struct arm armed = {.live = true, .name = "anna", .expiry_ns = INT64_MAX};
     simbench_init(b, NULL);
     struct safety *s = safety_new(&b->laser, &b->clk.clk);
     assert_non_null(s);
+    safety_arm(s, &armed);
     return s;
 }
 
@@ -50,6 +52,70 @@ static void on_needs_a_running_campaign(void **state)
     assert_int_equal(b.ons, 1);
     safety_free(s);
     assert_false(sim_laser_emits(&b.world.laser));
+}
+
+static void on_needs_an_arm(void **state)
+{
+    (void)state;
+    struct simbench b;
+    struct safety *s = begin(&b);
+    struct arm arm = {0};
+    struct gon_error err;
+    assert_int_equal(safety_begin(s, NULL, 0, &err), 0);
+    safety_permit(s, true);
+    safety_arm(s, NULL);
+    assert_int_equal(safety_on(s, &err), GON_E_REFUSED);
+    assert_string_equal(err.text, "stays off: not armed; gonio laser arm --for 8h");
+    safety_arm(s, &arm);
+    assert_int_equal(safety_on(s, &err), GON_E_REFUSED);
+    assert_int_equal(arm_set(&arm, "anna", NULL, 60, b.clk.t_ns, 0, NULL), 0);
+    clk_sleep(&b.clk.clk, CLK_S(60), NULL); // and nobody stepped it
+    assert_int_equal(safety_on(s, &err), GON_E_REFUSED);
+    assert_int_equal(b.ons, 0);
+    assert_int_equal(arm_set(&arm, "anna", NULL, 60, b.clk.t_ns, 0, NULL), 0);
+    assert_int_equal(safety_on(s, &err), 0);
+    assert_int_equal(b.ons, 1);
+    // an arm alone is not enough
+    assert_int_equal(safety_off(s, &err), 0);
+    safety_permit(s, false);
+    assert_int_equal(safety_on(s, &err), GON_E_REFUSED);
+    assert_int_equal(b.ons, 1);
+    safety_free(s);
+}
+
+static void an_arm_that_ends_in_the_light_makes_off_due_and_stands_until_the_run_paused(void **state)
+{
+    (void)state;
+    for (int by_hand = 0; by_hand < 2; by_hand++) {
+        struct simbench b;
+        struct safety *s = begin(&b);
+        struct arm arm = {0};
+        struct gon_error err;
+        assert_int_equal(safety_begin(s, NULL, 0, &err), 0);
+        safety_permit(s, true);
+        safety_arm(s, &arm);
+        assert_int_equal(arm_set(&arm, "anna", NULL, 60, b.clk.t_ns, 0, NULL), 0);
+        assert_int_equal(safety_on(s, &err), 0);
+        assert_false(safety_tick(s));
+        assert_int_equal(safety_alarm(s, &err), 0);
+        if (by_hand)
+            arm_end(&arm, "disarmed by bert");
+        else
+            clk_sleep(&b.clk.clk, CLK_S(60), NULL);
+        assert_true(safety_tick(s));
+        assert_false(safety_tick(s)); // once
+        assert_int_equal(safety_alarm(s, &err), GON_E_REFUSED);
+        assert_non_null(strstr(err.text, by_hand ? "the arm of anna ended: disarmed by bert"
+                                                 : "the arm of anna ended: it ran out"));
+        assert_int_equal(safety_off(s, &err), 0);
+        // a new arm alone is not light: the run learns of it first
+        assert_int_equal(arm_set(&arm, "anna", NULL, 60, b.clk.t_ns, 0, NULL), 0);
+        assert_int_equal(safety_on(s, &err), GON_E_REFUSED);
+        safety_permit(s, false);
+        safety_permit(s, true);
+        assert_int_equal(safety_on(s, &err), 0);
+        safety_free(s);
+    }
 }
 
 static void on_needs_a_closed_interlock(void **state)
@@ -226,6 +292,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_first_thing_a_laser_hears_is_off),
         cmocka_unit_test(on_needs_a_running_campaign),
+        cmocka_unit_test(on_needs_an_arm),
+        cmocka_unit_test(an_arm_that_ends_in_the_light_makes_off_due_and_stands_until_the_run_paused),
         cmocka_unit_test(on_needs_a_closed_interlock),
         cmocka_unit_test(an_on_whose_answer_is_lost_is_followed_by_off_and_never_repeated),
         cmocka_unit_test(an_off_that_does_nothing_is_said_aloud_and_blocks_on),
