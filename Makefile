@@ -136,7 +136,7 @@ check-slow: $(SLOW_TESTS:%=$(B)/tests/%) $(B)/tests/dst
 	$(Q)set -e; for t in $^; do $$t; done
 	$(Q)$(if $(CI),,$(MAKE) --no-print-directory check-deaths)
 
-# goniod dies 1,000 times with the laser on, 250 times each way (an hour or so). In CI the system tests do that 80 times.
+# goniod dies 1,000 times with the laser on, 250 times each way (an hour or so). In CI the system tests do that 20 times.
 check-deaths: all $(B)/tests/libmishap.so
 	$(Q)GONIO_BUILD=$(abspath $(B)) GONIO_JOBS=4 GONIO_GUARD_DEATHS=250 scripts/system -rP -k off_follows
 

@@ -96,7 +96,7 @@ def test_an_arm_that_runs_out_switches_off_and_pauses(bench):
     assert not b.emits() and b.arm() is None
     assert b.gonio("anna", "resume", "--detach").returncode == 0
     events.until_state(run, "running")
-    events.until(lambda e: e["event"] == "reading")
+    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1, 60)  # after dark and beam
     assert b.emits()
 
 
@@ -169,7 +169,7 @@ def test_a_lost_device_that_comes_back_leaves_the_arm(bench):
     events.until_state(run, "paused")
     b.sim.control(do="plug", wire="detector")
     events.until_state(run, "running")
-    events.until(lambda e: e["event"] == "reading")
+    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1, 60)  # after dark and beam
     assert b.arm() == armed and b.emits()
 
 

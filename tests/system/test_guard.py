@@ -5,7 +5,7 @@ How late OFF comes is the time from the signal to the first OFF on the wire, by 
 (CLOCK_MONOTONIC, as ours). A machine that is busy is late itself: a second thread measures that meanwhile, as the most
 that a sleep of 1 ms took too long. The guard, the pty's worker and the simulator wake up once each on that way, so that
 three times as much and 10 ms are allowed on top, at most 1 s. The bounds are those of the design, 50 ms after a death and 550 ms after a hang, for every
-single one. GONIO_GUARD_DEATHS says how often goniod dies each way: 5, in CI 20 once, and 250 (1,000 in all) for the long run."""
+single one. GONIO_GUARD_DEATHS says how often goniod dies each way: 5, and 250 (1,000 in all) for the long run."""
 import ctypes
 import json
 import os
@@ -197,7 +197,7 @@ def test_a_daemon_that_was_stopped_goes_on_and_pauses(sim, start_daemon):
     assert not emits(sim)
     assert daemon.gonio("resume", "--detach").returncode == 0
     events.until_state(run, "running")
-    events.until(lambda e: e["event"] == "reading")
+    events.until(lambda e: e["event"] == "reading" and e["sweep"] >= 1, 60)  # after dark and beam
     assert emits(sim)
 
 

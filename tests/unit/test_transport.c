@@ -285,23 +285,30 @@ static void the_second_opener_hears_who_has_it(void **state)
 
 static void *let_go_later(void *ctx)
 {
-    clk_sleep(clk_system(), CLK_MS(60), NULL);
+    clk_sleep(clk_system(), CLK_MS(30), NULL);
     close(*(int *)ctx);
     return NULL;
 }
 
-// Closed, and still locked for a moment, as by somebody who looks into /proc/PID/fd.
+// Closed, and still locked for a moment, as by somebody who looks into /proc/PID/fd. A busy machine
+// may make the moment too long: once in ten it is not.
 static void ones_own_lock_is_waited_for(void **state)
 {
     (void)state;
-    pthread_t thread;
+    int rc = -1;
     struct line l = line_new();
-    struct transport *t = open_link(l.link);
-    int copy = dup(transport_fd(t));
-    transport_close(t);
-    assert_int_equal(pthread_create(&thread, NULL, let_go_later, &copy), 0);
-    transport_close(open_link(l.link));
-    pthread_join(thread, NULL);
+    for (int k = 0; k < 10 && rc < 0; k++) {
+        pthread_t thread;
+        struct transport *t = open_link(l.link);
+        int copy = dup(transport_fd(t));
+        transport_close(t);
+        assert_int_equal(pthread_create(&thread, NULL, let_go_later, &copy), 0);
+        rc = transport_open(l.link, clk_system(), NULL, &t, NULL);
+        pthread_join(thread, NULL);
+        if (rc >= 0)
+            transport_close(t);
+    }
+    assert_int_equal(rc, 0);
     close(l.master);
 }
 
