@@ -360,7 +360,8 @@ static struct http_reply post_exclusions(const struct call *c)
     if (decision_parse(c->request->body, c->request->size,
                        *c->request->name ? c->request->name : uid, &d, &err) < 0)
         return failed(&err);
-    hub_decide(c->hub, run, d, c->ticket);
+    char text[40];
+    hub_decide(c->hub, run, d, caller(c, text), c->ticket);
     return reply(HTTP_LATER, NULL);
 }
 

@@ -109,11 +109,12 @@ int engine_sit_out(struct engine *e)
 {
     struct suspender_state s = {.name = NULL};
     int64_t tend_ns = 0;
+    if (instrument_suspended(e->in, &s) && s.manual) // whoever goes on answers for the light
+        arm_end(instrument_arm(e->in), "the run was paused");
+    s.name = NULL;
     while (!is_over(e, &s)) {
         if (engine_pause_asked(e))
             return engine_take_over(e);
-        if (s.manual) // somebody has to look first
-            arm_end(instrument_arm(e->in), "the run was paused");
         take_resume(e, &s);
         if (engine_nap(e, CLK_MS(100)) < 0)
             return GON_E_CANCELED;

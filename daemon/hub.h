@@ -69,7 +69,8 @@ void hub_find(struct hub *h, int run, uint64_t ticket); // one that the queue do
 // What becomes of readings of a run; takes the decision. The ticket is answered when it is written,
 // and the run queued when a sweep is to be measured again.
 struct decision;
-void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t ticket);
+void hub_decide(struct hub *h, int run, struct decision *decision, const char *by,
+                uint64_t ticket);
 // Stops in any case; false: 32 tickets wait for the end of a stop already, and this one will not be
 // answered.
 bool hub_stop(struct hub *h, const char *why, uint64_t ticket);

@@ -54,13 +54,14 @@ static void answer_failed(struct hub *h, uint64_t ticket, const struct gon_error
 }
 
 // One that has the bench or waits is measured again by itself.
-static int submit_again(struct hub *h, int run, struct gon_error *err)
+static int submit_again(struct hub *h, int run, const char *by, struct gon_error *err)
 {
     struct queue_entry entries[MOST_KEPT];
     const size_t count = queue_entries(h->queue, entries, MOST_KEPT);
     for (size_t i = 0; i < count; i++)
         if (entries[i].run->id == run)
             return GON_OK;
+    arming_start(&h->arming, by);
     return queue_submit(h->queue, run, err);
 }
 
@@ -69,7 +70,7 @@ static void decided(struct hub *h, const struct note *n)
     struct gon_error err = n->err;
     const uint64_t event_id = hub_event_id(h);
     const struct run *run = n->thing ? queue_know(h->queue, n->thing) : NULL;
-    if (!run || (n->last && submit_again(h, n->run, &err) < 0)) {
+    if (!run || (n->last && submit_again(h, n->run, n->by, &err) < 0)) {
         answer_failed(h, n->ticket, &err);
         return;
     }

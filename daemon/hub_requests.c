@@ -127,11 +127,13 @@ void hub_find(struct hub *h, int run, uint64_t ticket)
     note_post(h->store_box, n);
 }
 
-void hub_decide(struct hub *h, int run, struct decision *decision, uint64_t ticket)
+void hub_decide(struct hub *h, int run, struct decision *decision, const char *by,
+                uint64_t ticket)
 {
     struct note *n = note_new(NOTE_DECIDE);
     n->ticket = ticket;
     n->run = run;
+    n->by = note_text(by);
     n->last = decision->verb == DECISION_REMEASURE;
     n->thing = decision;
     n->drop = decision_free;

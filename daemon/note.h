@@ -24,7 +24,7 @@ enum note_kind {
     NOTE_FIT,     // run, sweep, last, thing: struct fit_outcome
     NOTE_CLOSE,   // run, state, text: why
     NOTE_QUEUE,   // thing: struct state_queue, to keep
-    NOTE_DECIDE,  // ticket, run, last: a sweep is to be measured again, thing: struct decision
+    NOTE_DECIDE,  // ticket, by, run, last: a sweep is to be measured again, thing: struct decision
     NOTE_KEPT,    // ticket, run: status, text: body; comes back when what came before is written
     // to the instrument thread
     NOTE_START,   // run, thing: struct run_material
@@ -48,7 +48,7 @@ enum note_kind {
     NOTE_OPENED,   // run, thing: struct run_material; NULL: err
     NOTE_FITTED,   // run, sweep, last, text: JSON; NULL: err
     NOTE_CLOSED,   // run, last: it was done, but points of it are to be measured again, err
-    NOTE_DECIDED,  // ticket, run, last: as asked, count: readings, thing: struct run; NULL: err
+    NOTE_DECIDED,  // ticket, by, run, last: as asked, count: readings, thing: struct run; NULL: err
     NOTE_HAPPENED, // run, event, text; sweep and point: of the last stored reading
     NOTE_FIT_ASKED, // run, sweep, last
     NOTE_ENDED,    // run, state, err

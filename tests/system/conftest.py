@@ -276,17 +276,27 @@ def gonio(*args, env=None, patience_s=60.0, cwd=None, stdin=None, **kwargs):
                           env={**os.environ, "NO_COLOR": "", **(env or {})}, **kwargs)
 
 
-LONGEST = ["test_paper_campaign", "test_profile_campaign", "test_kill", "test_unplug", "test_replug",
-           "test_safety", "test_daemon"]
+LONGEST = ["test_paper_campaign", "test_profile_campaign", "test_walkthrough", "test_exclude", "test_suspend",
+           "test_queue", "test_service", "test_unplug", "test_replug", "test_safety", "test_daemon", "test_kill"]
 
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "timed: measures how long something takes; scripts/system runs it in quiet")
 
 
+def spread(few, many):
+    """Each of the few with its share of the many behind it."""
+    share = len(many) // max(len(few), 1)
+    mixed = []
+    for i, one in enumerate(few):
+        mixed += [one, *many[i * share:(i + 1) * share]]
+    return mixed + many[len(few) * share:]
+
+
 def pytest_collection_modifyitems(items):
     """The longest first, one to a worker: xdist deals the first quarter in equal runs of consecutive tests, so the
-    tests that lead those runs are the long ones, and short ones wait behind them."""
+    tests that lead those runs are the long ones, and short ones wait behind them. What is long besides is spread, as
+    later on, too, a worker gets several tests that follow each other."""
     rank = {name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.module.__name__, len(LONGEST)))
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
@@ -298,7 +308,7 @@ def pytest_collection_modifyitems(items):
     for leader in leaders:
         dealt += [leader, *short[:run - 1]]
         del short[:run - 1]
-    items[:] = dealt + others + short
+    items[:] = dealt + spread(others, short)
 
 
 @pytest.fixture(autouse=True)
