@@ -207,6 +207,8 @@ static int lights_out(struct engine *e)
     int rc = engine_shut(e);
     const bool stays = rc >= 0 && e->lit && engine_shutter_darkens(e);
     if (rc >= 0 && !stays)
+        rc = engine_heed_guard(e); // whose reason our own OFF would take back
+    if (rc >= 0 && !stays)
         rc = instrument_emission_off(e->in, &e->why);
     if (rc < 0)
         return rc;
